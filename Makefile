@@ -1,0 +1,125 @@
+# Everything here needs GNU make and Python 3.11 or newer; the rest is installed into .venv.
+#
+#   make demo    reproduce the paper and write its report
+#   make test    every check and every test
+#   make help    the other targets
+#
+# To choose the interpreter: make PYTHON=/path/to/python3.12 test
+
+VENV := .venv
+BIN := $(VENV)/bin
+# Written when an installation is complete; older than pyproject.toml means out of date.
+RUN_STAMP := $(VENV)/.installed-run
+DEV_STAMP := $(VENV)/.installed-dev
+REPRODUCTION := build/reproduction
+PYTEST_ARGS ?= -n auto --maxprocesses 8
+
+# The matrices are small: one BLAS thread per process is fastest, and tests run in parallel.
+export OPENBLAS_NUM_THREADS ?= 1
+export OMP_NUM_THREADS ?= 1
+export MKL_NUM_THREADS ?= 1
+# Packages from elsewhere (a sourced ROS set-up, say) must not shadow those of .venv.
+unexport PYTHONPATH
+unexport PYTHONHOME
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+.PHONY: help
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+.PHONY: demo
+demo: $(RUN_STAMP) ## reproduce the paper; print where the report is
+	@$(BIN)/copsense reproduce --output $(REPRODUCTION) --force
+
+.PHONY: test
+test: lint format types imports ## every check, then every test
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+.PHONY: pytest
+pytest: $(DEV_STAMP) ## the tests alone
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+.PHONY: lint
+lint: $(DEV_STAMP) ## mistakes and style
+	$(BIN)/ruff check
+
+.PHONY: format
+format: $(DEV_STAMP) ## formatting (checked, nothing is changed)
+	$(BIN)/ruff format --check
+
+.PHONY: types
+types: $(DEV_STAMP) ## type hints
+	$(BIN)/mypy
+
+.PHONY: imports
+imports: $(DEV_STAMP) ## which module may import which
+	$(BIN)/lint-imports
+
+.PHONY: fix
+fix: $(DEV_STAMP) ## format, and mend what can be mended without thought
+	$(BIN)/ruff check --fix
+	$(BIN)/ruff format
+
+.PHONY: docs
+docs: $(DEV_STAMP) ## build the documentation into build/docs; a warning is an error
+	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --nitpicky \
+	    --doctree-dir build/doctrees --builder html docs build/docs
+	@echo "build/docs/index.html"
+
+.PHONY: venv
+venv: $(DEV_STAMP) ## set .venv up for development
+
+.PHONY: clean
+clean: ## remove everything that was built, .venv included
+	rm -rf $(VENV) build dist docs/gallery docs/sg_execution_times.rst
+	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
+	find docs examples src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# --- set-up -------------------------------------------------------------------------------------
+
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
+
+$(RUN_STAMP): pyproject.toml
+	@$(MAKE) --no-print-directory ensure-venv
+	@echo "Installing copsense and the robot models into $(VENV) ..."
+	@$(PIP_INSTALL) '.[robots]'
+	@touch $@
+
+$(DEV_STAMP): pyproject.toml
+	@$(MAKE) --no-print-directory ensure-venv
+	@echo "Installing copsense with its development tools into $(VENV) ..."
+	@$(PIP_INSTALL) '.[dev]'
+	@touch $(RUN_STAMP) $@
+
+# Keeps an environment that works. Otherwise makes one with the first interpreter that can;
+# each is run to find out, since a name on PATH may be a shim that only fails.
+.PHONY: ensure-venv
+ensure-venv:
+	@if $(BIN)/python -c 'import sys, pip; sys.exit(sys.version_info < (3, 11))' \
+	        >/dev/null 2>&1; then \
+	    exit 0; \
+	fi; \
+	bare=; \
+	for python in $(or $(PYTHON),python3.13 python3.12 python3.11 python3 python); do \
+	    "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+	        >/dev/null 2>&1 || continue; \
+	    if "$$python" -c 'import ensurepip, venv' >/dev/null 2>&1; then \
+	        echo "Making $(VENV) with $$("$$python" --version) ($$python) ..."; \
+	        exec "$$python" -m venv --clear $(VENV); \
+	    fi; \
+	    bare=$${bare:-$$python}; \
+	done; \
+	exec >&2; \
+	if [ -n "$$bare" ]; then \
+	    version=$$("$$bare" -c 'import sys; print("%d.%d" % sys.version_info[:2])'); \
+	    echo "copsense: $$bare (Python $$version) lacks the modules venv and ensurepip."; \
+	    echo "On Debian or Ubuntu: apt install python$$version-venv"; \
+	else \
+	    echo "copsense: no Python 3.11 or newer that runs was found. Tried:" \
+	        "$(or $(PYTHON),python3.13 python3.12 python3.11 python3 python)."; \
+	    echo "Install one (Debian 12, Ubuntu 24.04: apt install python3 python3-venv)," \
+	        "or name it: make PYTHON=/path/to/python3"; \
+	fi; \
+	exit 1
