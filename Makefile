@@ -73,13 +73,13 @@ venv: $(DEV_STAMP) ## set .venv up for development
 
 .PHONY: clean
 clean: ## remove everything that was built, .venv included
-	rm -rf $(VENV) build dist docs/gallery docs/sg_execution_times.rst
+	rm -rf $(VENV) build dist docs/gallery
 	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find docs examples src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # --- set-up -------------------------------------------------------------------------------------
 
-PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --editable
 
 $(RUN_STAMP): pyproject.toml
 	@$(MAKE) --no-print-directory ensure-venv

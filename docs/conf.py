@@ -1,0 +1,101 @@
+"""Sphinx configuration. Building and reading the pages needs no network."""
+
+from __future__ import annotations
+
+import os
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.application import Sphinx
+from sphinx.util import logging
+from sphinx.writers.html5 import HTML5Translator
+
+os.environ["MPLBACKEND"] = "agg"
+
+logger = logging.getLogger(__name__)
+
+HERE = Path(__file__).parent
+
+project = "copsense"
+author = "copsense developers"
+copyright = "2026, copsense developers"
+release = version = installed_version("copsense")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
+]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["gallery/**/*.ipynb"]
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_preserve_defaults = True
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+python_use_unqualified_type_names = True
+
+# Types that are documented elsewhere: without the network there is nothing to link them to.
+nitpick_ignore_regex = [
+    (
+        r"py:.*",
+        r"(builtins|collections|numpy|np|pathlib|pin|pinocchio|xarray|xr|matplotlib|jaxtyping|typing)"
+        r"(\..*)?",
+    ),
+]
+
+sphinx_gallery_conf = {
+    "examples_dirs": str(HERE.parent / "examples"),
+    "gallery_dirs": "gallery",
+    # Every example runs at every build.
+    "filename_pattern": r"\.py$",
+    "run_stale_examples": True,
+    "within_subsection_order": "FileNameSortKey",
+    "remove_config_comments": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "write_computation_times": False,
+    "show_memory": False,
+}
+
+html_theme = "furo"
+html_title = "copsense"
+html_static_path = ["_static"]
+html_css_files = ["copsense.css"]
+html_copy_source = False
+html_show_sphinx = False
+html_math_renderer = "mathml"
+
+
+def write_inline_math(translator: HTML5Translator, node: nodes.math) -> None:
+    """Write a formula in the text as MathML, which browsers show without a script."""
+    translator.body.append(as_mathml(node, as_block=False))
+    raise nodes.SkipNode
+
+
+def write_block_math(translator: HTML5Translator, node: nodes.math_block) -> None:
+    """Write a displayed formula as MathML."""
+    translator.body.append(f'<div class="math">{as_mathml(node, as_block=True)}</div>\n')
+    raise nodes.SkipNode
+
+
+def as_mathml(node: nodes.Element, *, as_block: bool) -> str:
+    """The MathML of a formula; one that docutils cannot read is a warning."""
+    try:
+        return tex2mathml(node.astext(), as_block=as_block)
+    except MathError as error:
+        logger.warning("%s In: %s", error, node.astext(), location=node)
+        return ""
+
+
+def setup(app: Sphinx) -> None:
+    """Register the MathML renderer."""
+    app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))
