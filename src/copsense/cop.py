@@ -1,0 +1,205 @@
+"""Centre of pressure and its kin, and how far a point is from a sole's edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.contact import Plane
+from copsense.equilibrium import StaticEquilibrium
+from copsense.errors import InvalidInputError, UnloadedContactError
+from copsense.stance import Stance
+
+_EDGE_NAMES = ("+x (front)", "+y (left)", "-x (back)", "-y (right)")
+
+
+@dataclass(frozen=True)
+class EdgeMargin:
+    """Distance of a point to the nearest edge of a sole.
+
+    Attributes:
+        distance: signed distance to that edge's line [m]; negative outside.
+        edge: index of the edge, from vertex `edge` to the next.
+        side: which side of the contact frame that edge faces, such as ``"+y (left)"``.
+        normal: the edge's outward unit normal in contact axes (2,).
+    """
+
+    distance: float
+    edge: int
+    side: str
+    normal: Float[np.ndarray, " 2"]
+
+
+def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
+    """Centre of pressure of each contact in its own frame [m] ([Romano2016] Eq. (10)).
+
+    p = (-m_y, m_x) / f_z. A point contact's is its origin.
+
+    Raises:
+        UnloadedContactError: a contact carries no normal force.
+    """
+    if equilibrium.unloaded:
+        raise UnloadedContactError(equilibrium.unloaded)
+    w = equilibrium.wrenches
+    return np.column_stack([-w[:, 4], w[:, 3]]) / w[:, 2:3]
+
+
+def center_of_pressure(
+    force: ArrayLike, moment: ArrayLike, plane: Plane | None = None
+) -> Float[np.ndarray, " 3"]:
+    """Where on a plane a force and a moment about the origin have no tipping moment.
+
+    p = (n x m + (n . p0) f) / (n . f), all in the same axes.
+
+    Args:
+        force: resultant force (3,) [N].
+        moment: resultant moment (3,) about the axes' origin [Nm].
+        plane: default z = 0.
+
+    Raises:
+        UnloadedContactError: the force has no component along the normal.
+    """
+    f, m = np.asarray(force, dtype=float), np.asarray(moment, dtype=float)
+    plane = plane or Plane()
+    n, p0 = np.array(plane.normal), np.array(plane.point)
+    along = float(n @ f)
+    if abs(along) <= 1e-12 * max(1.0, float(np.linalg.norm(f))):
+        raise UnloadedContactError(("the plane",))
+    return np.asarray((np.cross(n, m) + (n @ p0) * f) / along)
+
+
+def total_center_of_pressure(
+    equilibrium: StaticEquilibrium, plane: Plane | None = None
+) -> Float[np.ndarray, " 3"]:
+    """Centre of pressure of the whole robot on a plane, in the world [m]."""
+    return center_of_pressure(*_resultant(equilibrium.stance, equilibrium.world_wrenches), plane)
+
+
+def com_projection(stance: Stance, plane: Plane | None = None) -> Float[np.ndarray, " 3"]:
+    """Projection of the centre of mass along gravity onto a plane, in the world [m]."""
+    plane = plane or Plane()
+    n, down = np.array(plane.normal), stance.robot.model.gravity.linear
+    if abs(n @ down) <= 1e-12 * np.linalg.norm(down):
+        raise InvalidInputError("the plane is parallel to gravity: the CoM has no projection on it.")
+    return np.asarray(stance.com + down * (n @ (np.array(plane.point) - stance.com)) / (n @ down))
+
+
+def zero_moment_point(
+    stance: Stance, velocity: ArrayLike, acceleration: ArrayLike, plane: Plane | None = None
+) -> Float[np.ndarray, " 3"]:
+    """Zero-moment point of a motion on a plane, in the world [m].
+
+    Args:
+        stance: the configuration; its contacts do not enter.
+        velocity: v (nv,), base in its own frame.
+        acceleration: dv/dt (nv,).
+        plane: default z = 0.
+    """
+    return center_of_pressure(*_required(stance, velocity, acceleration), plane)
+
+
+def foot_rotation_indicator(
+    stance: Stance,
+    contact: str,
+    velocity: ArrayLike,
+    acceleration: ArrayLike,
+    plane: Plane | None = None,
+    *,
+    other_wrenches: ArrayLike | None = None,
+) -> Float[np.ndarray, " 3"]:
+    """Foot rotation indicator of a foot (Goswami 1999), in the world [m].
+
+    Where the ground would have to push for the foot to stay at rest while the rest of the robot
+    moves as given: the zero-moment point without the foot's own inertia. On the sole it equals the
+    centre of pressure; outside, the foot turns.
+
+    Args:
+        stance: the configuration and contacts.
+        contact: name of the foot's contact.
+        velocity: v (nv,).
+        acceleration: dv/dt (nv,).
+        plane: default z = 0.
+        other_wrenches: wrenches (nc, 6) of the contacts in contact axes, of which every one but
+            the foot's is taken off; default none (single support).
+    """
+    names = stance.contact_names
+    if contact not in names:
+        raise InvalidInputError(f"no contact named {contact!r}. Valid: {', '.join(names)}.")
+    force, moment = _required(stance, velocity, acceleration)
+    model, data = stance.robot.model, stance.robot.model.createData()
+    pin.forwardKinematics(
+        model, data, stance.q, np.asarray(velocity, float), np.asarray(acceleration, float)
+    )
+    k = names.index(contact)
+    foot = stance.robot.frame(stance.contacts[k].frame).parentJoint
+    v, inertia = data.v[foot], model.inertias[foot]
+    rate = data.oMi[foot].act(inertia * data.a[foot] + inertia.vxiv(v))
+    force, moment = force - rate.linear, moment - rate.angular
+    if other_wrenches is not None:
+        others = np.array(other_wrenches, dtype=float)
+        others[k] = 0.0
+        world = [
+            np.concatenate([p.rotation @ w[:3], p.rotation @ w[3:]])
+            for p, w in zip(stance.placements, others, strict=True)
+        ]
+        taken_f, taken_m = _resultant(stance, np.array(world))
+        force, moment = force - taken_f, moment - taken_m
+    return center_of_pressure(force, moment, plane)
+
+
+def half_planes(
+    polygon: Float[np.ndarray, "k 2"],
+) -> tuple[Float[np.ndarray, "e 2"], Float[np.ndarray, " e"]]:
+    """Outward unit normals a and offsets b of a sole's edges: inside where a p <= b.
+
+    A sole of two points (a line) has its two ends as edges.
+    """
+    if len(polygon) == 2:
+        along = (polygon[1] - polygon[0]) / np.linalg.norm(polygon[1] - polygon[0])
+        normals = np.array([-along, along])
+        return normals, np.array([normals[0] @ polygon[0], normals[1] @ polygon[1]])
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * polygon, axis=1)
+
+
+def edge_margin(polygon: Float[np.ndarray, "k 2"], point: ArrayLike) -> EdgeMargin:
+    """The margin of a point of the contact plane to a sole's nearest edge.
+
+    Args:
+        polygon: convex, counter-clockwise vertices (k, 2) [m].
+        point: (2,) in the same frame [m].
+    """
+    normals, offsets = half_planes(polygon)
+    distances = offsets - normals @ np.asarray(point, dtype=float)
+    edge = int(np.argmin(distances))
+    quarter = int(np.round(np.arctan2(normals[edge, 1], normals[edge, 0]) / (np.pi / 2))) % 4
+    return EdgeMargin(float(distances[edge]), edge, _EDGE_NAMES[quarter], normals[edge])
+
+
+def _resultant(stance: Stance, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about the world's origin of wrenches given in world axes."""
+    origins = np.array([place.translation for place in stance.placements])
+    moment = world[:, 3:].sum(axis=0) + np.cross(origins, world[:, :3]).sum(axis=0)
+    return world[:, :3].sum(axis=0), moment
+
+
+def _required(
+    stance: Stance, velocity: ArrayLike, acceleration: ArrayLike
+) -> tuple[np.ndarray, np.ndarray]:
+    """Force and moment about the world's origin that the environment must supply."""
+    model = stance.robot.model
+    v, a = np.asarray(velocity, dtype=float), np.asarray(acceleration, dtype=float)
+    for what, array in (("velocity", v), ("acceleration", a)):
+        if array.shape != (model.nv,) or not np.all(np.isfinite(array)):
+            raise InvalidInputError(
+                f"the {what} must be finite and of shape ({model.nv},); got {array.shape}."
+            )
+    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), stance.q, v, a)
+    force = rate.linear - stance.robot.mass * model.gravity.linear
+    return force, rate.angular + np.cross(stance.com, force)

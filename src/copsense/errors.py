@@ -1,0 +1,101 @@
+"""The errors copsense raises: one small family, each saying what was wrong and what to do."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class CopsenseError(Exception):
+    """Base of every error that copsense raises on purpose."""
+
+
+class InvalidInputError(CopsenseError, ValueError):
+    """A value that the caller gave cannot be used; the message names it and the remedy."""
+
+
+class UnknownNameError(CopsenseError, KeyError):
+    """A name that is not among the valid ones.
+
+    Attributes:
+        kind: what was looked up, e.g. ``"frame"``.
+        name: the name as given.
+        valid: the valid names.
+    """
+
+    def __init__(self, kind: str, name: object, valid: Iterable[str], remedy: str = "") -> None:
+        """Store the data and compose the message with the nearest valid names."""
+        self.kind, self.name, self.valid = kind, str(name), tuple(valid)
+        lowered = {choice.lower(): choice for choice in self.valid}
+        near = difflib.get_close_matches(self.name.lower(), lowered, n=3, cutoff=0.5)
+        hint = f" Did you mean {' or '.join(lowered[n] for n in near)}?" if near else ""
+        listed = ", ".join(self.valid) if self.valid else "none"
+        self.message = f"no {kind} named {self.name!r}.{hint} Valid: {listed}." + (
+            f" {remedy}" if remedy else ""
+        )
+        super().__init__(self.message)
+
+    def __str__(self) -> str:
+        """The message itself: KeyError would show its repr."""
+        return self.message
+
+
+class ModelLoadError(CopsenseError):
+    """A robot description could not be read (missing, malformed, or with a missing mesh)."""
+
+
+class MissingExtraError(CopsenseError, ImportError):
+    """An optional package is needed; the message names the extra to install."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        """Compose the message from the package, the extra that brings it, and why."""
+        self.package, self.extra = package, extra
+        super().__init__(
+            f"{purpose} needs the package {package!r}. Install it with: "
+            f'pip install "copsense[{extra}]"'
+        )
+
+
+class ContactGeometryError(CopsenseError):
+    """A contact does not lie where it was said to; the message gives the offsets."""
+
+
+class InsufficientContactsError(CopsenseError):
+    """The contacts cannot carry the robot's weight, however the load is shared."""
+
+
+class UndeterminedWrenchError(CopsenseError):
+    """The criterion leaves a family of minimisers; a tie-break is needed.
+
+    Attributes:
+        directions: wrench directions (per contact and component) left free.
+    """
+
+    def __init__(self, message: str, directions: tuple[str, ...] = ()) -> None:
+        """Store the free directions beside the message."""
+        self.directions = directions
+        super().__init__(message)
+
+
+class UnloadedContactError(CopsenseError):
+    """A contact carries no normal force, so it has no centre of pressure.
+
+    Attributes:
+        contacts: names of the unloaded contacts.
+    """
+
+    def __init__(self, contacts: tuple[str, ...]) -> None:
+        """Compose the message from the contacts' names."""
+        self.contacts = contacts
+        super().__init__(
+            f"no normal force on {', '.join(contacts)}: the centre of pressure is undefined "
+            "there. Move the posture off this point, or remove the contact from the stance."
+        )
+
+
+class UnreachablePostureError(CopsenseError):
+    """No posture with the contacts in place meets the request."""
+
+
+class SensitivityMismatchError(CopsenseError):
+    """An analytic sensitivity disagrees with finite differences."""

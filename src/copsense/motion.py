@@ -1,0 +1,203 @@
+"""Path: stances along a curve on the constraint manifold, with the curve's exact tangent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.errors import CopsenseError, InvalidInputError
+from copsense.posture import Posture, PostureCost, contact_error, pull_back, solve_posture
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Stances along a curve on the constraint manifold, parametrised by a named coordinate.
+
+    Attributes:
+        stances: the postures, in order.
+        coordinate: name of the coordinate, such as ``"com_y"`` or ``"l_hip_roll"``.
+        unit: its unit, ``"m"``, ``"rad"`` or ``"1"``.
+        values: the coordinate at each posture (N,).
+        tangents: dq/dcoordinate at each posture (N, nv), with J t = 0.
+        failures: index of a posture that could not be reached -> the reason; the stance kept
+            there is the nearest one found.
+    """
+
+    stances: tuple[Stance, ...]
+    coordinate: str
+    unit: str
+    values: Float[np.ndarray, " N"]
+    tangents: Float[np.ndarray, "N nv"]
+    failures: Mapping[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of postures."""
+        return len(self.stances)
+
+    def joint_rates(self, joint: str) -> Float[np.ndarray, " N"]:
+        """d joint / d coordinate at each posture (N,)."""
+        return self.tangents[:, self.stances[0].robot.velocity_index(joint)]
+
+
+def lateral_sweep(
+    stance: Stance,
+    start: float,
+    stop: float,
+    count: int,
+    *,
+    com_x: float | None = None,
+    cost: PostureCost | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Path:
+    """Sweep the centre of mass sideways: CoM y from `start` to `stop`, CoM x held, height free.
+
+    Args:
+        stance: the posture that every other stays nearest to.
+        start: first world y of the centre of mass [m].
+        stop: last world y [m].
+        count: number of postures.
+        com_x: world x where the CoM is held; default over the mean of the contacts (a planar
+            robot has none to hold).
+        cost: weights of the deviations from `stance`.
+        progress: called with 1 after each posture.
+
+    Returns:
+        A path whose coordinate is ``com_y`` [m]. A posture out of reach is listed in
+        `Path.failures`.
+    """
+    if com_x is None and stance.robot.base_nv == 6:
+        com_x = float(np.mean([world.translation[0] for world in stance.placements]))
+
+    def request(y: float) -> dict[str, Any]:
+        return {"com": (com_x, y, None), "cost": cost}
+
+    values = _grid(start, stop, count)
+    column = 0 if com_x is None else 1
+    return _sweep(stance, "com_y", "m", values, float(stance.com[1]), request, column, progress)
+
+
+def joint_sweep(
+    stance: Stance,
+    joint: str,
+    start: float,
+    stop: float,
+    count: int,
+    *,
+    cost: PostureCost | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Path:
+    """Sweep one joint with the contacts in place, the rest staying nearest to `stance`.
+
+    Args:
+        stance: the posture that every other stays nearest to.
+        joint: name of a one-degree-of-freedom joint.
+        start: its first position [rad, or m for a prismatic joint].
+        stop: its last position.
+        count: number of postures.
+        cost: weights of the deviations from `stance`.
+        progress: called with 1 after each posture.
+    """
+    robot = stance.robot
+    kind = robot.model.joints[robot.joint_id(joint)].shortname()
+    unit = "m" if kind.startswith("JointModelP") else "rad"
+    now = robot.joint_position(stance.q, joint)
+
+    def request(position: float) -> dict[str, Any]:
+        return {"joints": {joint: position}, "cost": cost}
+
+    return _sweep(stance, joint, unit, _grid(start, stop, count), now, request, 0, progress)
+
+
+def path_through(
+    stance: Stance, configurations: Iterable[ArrayLike], *, project: bool = False
+) -> Path:
+    """Make a path of a list of configurations, parametrised by their index.
+
+    A list has no tangent of its own. The one given is the central difference of the neighbours
+    (one-sided at the ends), projected onto the admissible motions: exactly admissible, and as
+    near to the curve's own tangent as the list is fine.
+
+    Args:
+        stance: says where the contacts are.
+        configurations: the configurations (nq,), in order.
+        project: move each onto the manifold instead of refusing one that has moved a contact.
+
+    Raises:
+        InvalidInputError: no configuration, a bad one, or one with a contact over 1e-9 away.
+    """
+    stances: list[Stance] = []
+    for number, q in enumerate(configurations):
+        found = stance.at(np.asarray(q, dtype=float), check=False)
+        error = float(np.abs(contact_error(found, stance.placements)).max())
+        if project:
+            found = pull_back(found, stance.placements)
+        elif error > 1e-9:
+            raise InvalidInputError(
+                f"configuration {number} has a contact {error:.2e} (m or rad) away from the "
+                "stance's. Give configurations with the contacts in place, or project=True."
+            )
+        stances.append(stance.at(found.q))
+    if not stances:
+        raise InvalidInputError("the list of configurations is empty. Give at least one.")
+    last = len(stances) - 1
+    tangents = np.zeros((len(stances), stance.robot.model.nv))
+    for i, here in enumerate(stances):
+        a, b = max(i - 1, 0), min(i + 1, last)
+        secant = pin.difference(stance.robot.model, stances[a].q, stances[b].q) / max(b - a, 1)
+        basis = here.admissible_motions
+        tangents[i] = basis @ (basis.T @ secant)
+    return Path(tuple(stances), "index", "1", np.arange(len(stances), dtype=float), tangents)
+
+
+def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
+    if not (np.isfinite(start) and np.isfinite(stop)):
+        raise InvalidInputError(f"the ends of a sweep must be finite, got {start} and {stop}.")
+    if count < 1:
+        raise InvalidInputError(f"a sweep has at least one posture; got a count of {count}.")
+    return np.linspace(start, stop, count)
+
+
+def _sweep(
+    stance: Stance,
+    coordinate: str,
+    unit: str,
+    values: np.ndarray,
+    now: float,
+    request: Callable[[float], dict[str, Any]],
+    column: int,
+    progress: Callable[[int], object] | None,
+) -> Path:
+    """Solve outwards from the value nearest to `now`, each posture started from its neighbour."""
+    middle = int(np.argmin(np.abs(values - now)))
+    found: dict[int, Posture | str] = {}
+    for order in (range(middle, len(values)), range(middle - 1, -1, -1)):
+        near: Posture | None = None
+        if order.start == middle - 1 and isinstance(found.get(middle), Posture):
+            near = found[middle]  # type: ignore[assignment]
+        for i in order:
+            try:
+                start = near.stance if near else stance
+                near = solve_posture(start, reference=stance.q, **request(float(values[i])))
+                found[i] = near
+            except CopsenseError as error:
+                found[i] = str(error)
+            if progress:
+                progress(1)
+    stances, tangents, failures = [], [], {}
+    for i in range(len(values)):
+        result = found[i]
+        if isinstance(result, Posture):
+            stances.append(result.stance)
+            tangents.append(result.tangents[:, column])
+        else:
+            failures[i] = result
+            stances.append(stance)
+            tangents.append(np.zeros(stance.robot.model.nv))
+    return Path(tuple(stances), coordinate, unit, values, np.array(tangents), failures)

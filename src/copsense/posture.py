@@ -1,0 +1,252 @@
+"""Posture: the configuration nearest to a reference that keeps the contacts in place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.errors import InvalidInputError, UnreachablePostureError
+from copsense.stance import Stance
+
+TOLERANCE = 1e-12  # on every constraint [m, rad]
+_STATIONARITY = 1e-11  # on the cost's gradient along the manifold
+_NEWTON_REGION = 1e-2  # constraint error under which the exact curvature is used
+_LONGEST_STEP = 0.3  # rad or m: longer Newton steps are shortened
+_MAX_ITERATIONS = 100
+
+
+@dataclass(frozen=True)
+class PostureCost:
+    """What a posture minimises, 1/2 sum w (deviation from the reference)^2, the base free to move.
+
+    Attributes:
+        base_rotation: weight of the base's rotation vector [1/rad^2].
+        supporting: weight of each joint between a contact and the base.
+        free: weight of every other joint, such as torso and arms.
+    """
+
+    base_rotation: float = 10.0
+    supporting: float = 1.0
+    free: float = 20.0
+
+    def __post_init__(self) -> None:
+        """Refuse a weight that would leave a joint undetermined."""
+        for name in ("base_rotation", "supporting", "free"):
+            weight = getattr(self, name)
+            if not (np.isfinite(weight) and weight > 0):
+                raise InvalidInputError(f"posture weight {name} must be positive, got {weight}.")
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """A solved posture and how it moves when its request does.
+
+    Attributes:
+        stance: the stance at the posture.
+        tangents: dq/d(request) (nv, r): one exact column per requested CoM coordinate, in the
+            order x, y, z, then one per requested joint; each satisfies J t = 0.
+        iterations: Newton iterations taken.
+    """
+
+    stance: Stance
+    tangents: Float[np.ndarray, "nv r"]
+    iterations: int
+
+
+def solve_posture(
+    stance: Stance,
+    *,
+    com: Sequence[float | None] = (None, None, None),
+    joints: Mapping[str, float] | None = None,
+    targets: Sequence[pin.SE3] | None = None,
+    reference: ArrayLike | None = None,
+    cost: PostureCost | None = None,
+) -> Posture:
+    """Find the posture nearest to a reference with the contacts in place (inverse kinematics).
+
+    Args:
+        stance: where to start; its contacts stay where they are unless `targets` moves them.
+        com: centre of mass (x, y, z) in the world [m]; None leaves a coordinate free.
+        joints: joint name -> position [rad, or m for a prismatic joint] to hold.
+        targets: world placement of each contact frame, to move the feet.
+        reference: configuration that deviations are measured from; default the stance's own.
+        cost: weights of the deviations.
+
+    Returns:
+        A posture that meets every constraint within 1e-12 (m, rad).
+
+    Raises:
+        UnreachablePostureError: no such posture was found; the message says what remains.
+        UnknownNameError: a joint is not in the model.
+    """
+    robot = stance.robot
+    cost = cost or PostureCost()
+    joints = dict(joints or {})
+    wanted = [(i, float(value)) for i, value in enumerate(com) if value is not None]
+    if len(com) != 3 or not np.all(np.isfinite([v for _, v in wanted] + list(joints.values()))):
+        raise InvalidInputError(f"com must be three numbers or None and joints finite, got {com}.")
+    places = tuple(stance.placements if targets is None else targets)
+    if len(places) != len(stance.contacts):
+        raise InvalidInputError(
+            f"{len(places)} targets for {len(stance.contacts)} contacts: give one for each."
+        )
+    home = stance.q if reference is None else robot.check_configuration(reference)
+    columns = [robot.velocity_index(joint) for joint in joints]
+    weights = _weights(stance, cost)
+    curved = robot.model.copy()  # its gravity is set below, to bend the CoM constraint
+    selector = np.eye(robot.model.nv)[columns]
+    axes = [i for i, _ in wanted]
+
+    here, multipliers = stance, None
+    for iteration in range(_MAX_ITERATIONS):
+        # h(q) = 0: contacts, centre of mass, joints; C = dh/dq.
+        h = np.concatenate(
+            [
+                contact_error(here, places),
+                [here.com[i] - value for i, value in wanted],
+                [robot.joint_position(here.q, joint) - angle for joint, angle in joints.items()],
+            ]
+        )
+        C = np.vstack([here.jacobian, here.com_jacobian[axes], selector])
+        gradient, hessian = _cost_derivatives(here, home, weights)
+        if multipliers is None:
+            multipliers = np.linalg.lstsq(C.T, -gradient, rcond=1e-10)[0]
+        stationarity = gradient + C.T @ multipliers
+        small = float(np.abs(h).max())
+        if small < _NEWTON_REGION:
+            # Curvature of the Lagrangian, sum lambda d2h: a static torque derivative in which
+            # gravity stands for the CoM's multiplier and the contact forces for the feet's.
+            contact_rows = here.jacobian.shape[0]
+            pull = np.zeros(3)
+            pull[axes] = multipliers[contact_rows : contact_rows + len(axes)]
+            curved.gravity.linear = -pull / robot.mass
+            hessian = hessian + here.balance_derivative(-multipliers[:contact_rows], curved)
+        K = np.block([[hessian, C.T], [C, np.zeros((len(h), len(h)))]])
+        if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
+            requests = len(axes) + len(columns)
+            rate = np.zeros((len(K), requests))
+            rate[len(K) - requests :] = np.eye(requests)
+            tangents = _solve(K, rate)[: robot.model.nv]
+            return Posture(stance.at(here.q), tangents, iteration)
+        step = _solve(K, -np.concatenate([stationarity, h]))
+        length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
+        here = here.at(
+            pin.integrate(robot.model, here.q, length * step[: robot.model.nv]), check=False
+        )
+        multipliers = multipliers + length * step[robot.model.nv :]
+    raise UnreachablePostureError(_what_remains(stance, h, axes, list(joints), wanted))
+
+
+def retract(stance: Stance, displacement: Float[np.ndarray, " nv"]) -> Stance:
+    """Move a stance along a velocity, then back to where its contacts are.
+
+    The correction is the smallest one (minimum-norm Newton), so an admissible v is the tangent of
+    t -> retract(stance, t v) at 0, and central differences along it converge as t^2.
+
+    Raises:
+        UnreachablePostureError: the displacement leads to no posture with the contacts in place.
+    """
+    model = stance.robot.model
+    moved = stance.at(pin.integrate(model, stance.q, displacement), check=False)
+    return pull_back(moved, stance.placements)
+
+
+def pull_back(stance: Stance, targets: Sequence[pin.SE3]) -> Stance:
+    """Bring the contacts of a stance to their targets by the smallest corrections.
+
+    Raises:
+        UnreachablePostureError: they cannot be brought there.
+    """
+    here, model = stance, stance.robot.model
+    for _ in range(_MAX_ITERATIONS):
+        error = contact_error(here, targets)
+        if np.abs(error).max() < TOLERANCE / 10:
+            return here.at(here.q)
+        step = -np.linalg.lstsq(here.jacobian, error, rcond=1e-9)[0]
+        step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
+        here = here.at(pin.integrate(model, here.q, step), check=False)
+    raise UnreachablePostureError(_what_remains(stance, error, [], [], []))
+
+
+def contact_error(stance: Stance, targets: Sequence[pin.SE3]) -> Float[np.ndarray, " m"]:
+    """How far each contact frame is from its target (m,): metres and radians, contact axes."""
+    errors = []
+    for contact, here, target in zip(stance.contacts, stance.placements, targets, strict=True):
+        if contact.kind == "point":
+            errors.append(here.rotation.T @ (here.translation - target.translation))
+        else:
+            errors.append(pin.log6(target.actInv(here)).vector[list(contact.components)])
+    return np.concatenate(errors)
+
+
+def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
+    """1 for every velocity between a contact and the base, 0 elsewhere (base: 0)."""
+    mask = np.zeros(stance.robot.model.nv)
+    for contact in stance.contacts:
+        for joint in stance.robot.model.supports[stance.robot.frame(contact.frame).parentJoint]:
+            if joint > 1:
+                model_joint = stance.robot.model.joints[joint]
+                mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
+    return mask
+
+
+def _weights(stance: Stance, cost: PostureCost) -> Float[np.ndarray, " nv"]:
+    """Weight of each velocity; none on the base's position, so that the feet decide it."""
+    mask = supporting_joints(stance)
+    weights = np.where(mask > 0, cost.supporting, cost.free)
+    if stance.robot.base_nv == 6:
+        weights[:3], weights[3:6] = 0.0, cost.base_rotation
+    else:
+        weights[:2], weights[2] = 0.0, cost.base_rotation
+    return weights
+
+
+def _cost_derivatives(
+    stance: Stance, home: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient of 1/2 w |deviation|^2 in the base's frame, and that gradient's derivative."""
+    model = stance.robot.model
+    deviation = pin.difference(model, home, stance.q)
+    hessian = np.diag(weights)
+    if stance.robot.base_nv == 6:
+        # r = log(R_home' R): its gradient is r itself (r is an eigenvector of the log's
+        # Jacobian), whose derivative is that Jacobian.
+        relative = pin.Quaternion(home[3:7]).matrix().T @ pin.Quaternion(stance.q[3:7]).matrix()
+        deviation[3:6] = pin.log3(relative)
+        hessian[3:6, 3:6] = weights[3] * pin.Jlog3(relative)
+    return weights * deviation, hessian
+
+
+def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve, or take the minimum-norm least squares where constraints are redundant."""
+    try:
+        solution = np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError:
+        solution = np.full(right.shape, np.inf)
+    if np.all(np.abs(solution) < 1e9):
+        return np.asarray(solution)
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-12)[0])
+
+
+def _what_remains(
+    stance: Stance,
+    h: np.ndarray,
+    axes: list[int],
+    joints: list[str],
+    wanted: list[tuple[int, float]],
+) -> str:
+    labels = [f"contact {row}" for row in stance.row_names]
+    labels += [f"CoM {'xyz'[i]}" for i in axes] + [f"joint {joint}" for joint in joints]
+    worst = int(np.argmax(np.abs(h)))
+    asked = ", ".join(f"CoM {'xyz'[i]} = {value:g} m" for i, value in wanted)
+    return (
+        f"no posture of {stance.robot.name!r} with the contacts in place was found"
+        + (f" for {asked}" if asked else "")
+        + f": {labels[worst]} remains {abs(h[worst]):.2e} (m or rad) off. Ask for less, or start "
+        "from a nearer posture."
+    )

@@ -1,0 +1,303 @@
+"""Robot: a floating-base rigid-body model, from URDF, MJCF or a ready ``pin.Model``."""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+
+# Root joints that let the whole robot move: the base rows of the statics are theirs.
+_FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
+
+
+@dataclass(frozen=True)
+class Description:
+    """The text a robot was read from, kept so that its collision geometry can be read later.
+
+    Attributes:
+        text: the XML.
+        language: ``"urdf"`` or ``"mjcf"``.
+        package_dirs: folders in which ``package://`` meshes are looked up.
+        path: the file the text came from, if any.
+    """
+
+    text: str
+    language: Literal["urdf", "mjcf"]
+    package_dirs: tuple[str, ...] = ()
+    path: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A floating-base robot at no particular posture.
+
+    Attributes:
+        name: how the robot is called in results.
+        model: the Pinocchio model; never changed after construction.
+        description: where it came from, or None for a ready model.
+    """
+
+    name: str
+    model: pin.Model
+    description: Description | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a model that has no floating base, or whose masses make no sense."""
+        model = self.model
+        if model.njoints < 2 or model.joints[1].shortname() not in _FLOATING:
+            root = model.joints[1].shortname() if model.njoints > 1 else "none"
+            raise InvalidInputError(
+                f"robot {self.name!r} has no floating base (its first joint is {root}). Build the "
+                "pin.Model with pin.JointModelFreeFlyer() as root joint, or load it from its URDF."
+            )
+        masses = np.array([body.mass for body in model.inertias])
+        if not np.all(np.isfinite(masses)) or np.any(masses < 0) or masses.sum() <= 0:
+            bad = [model.names[i] for i in range(1, model.njoints) if not masses[i] >= 0]
+            raise InvalidInputError(
+                f"robot {self.name!r} has a non-positive mass (total {masses.sum():g} kg"
+                + (f", negative at {', '.join(bad)}" if bad else "")
+                + "). Give its links positive masses."
+            )
+
+    @classmethod
+    def from_urdf(
+        cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
+    ) -> Robot:
+        """Read a URDF file or its text; a free-flyer base is added, meshes are not needed.
+
+        Args:
+            source: path of the file, or the XML itself.
+            name: the robot's name; default the one in the file.
+            package_dirs: folders that hold the packages of ``package://`` meshes.
+
+        Raises:
+            ModelLoadError: the file is missing or not a URDF.
+        """
+        description = _read_description(source, "urdf", package_dirs)
+        return cls.from_description(description, name=name)
+
+    @classmethod
+    def from_mjcf(
+        cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
+    ) -> Robot:
+        """Read an MJCF file or its text; see `from_urdf`. A base without joint gets a free-flyer."""
+        description = _read_description(source, "mjcf", package_dirs)
+        return cls.from_description(description, name=name)
+
+    @classmethod
+    def from_model(cls, model: pin.Model, *, name: str | None = None) -> Robot:
+        """Wrap a ready ``pin.Model`` (copied) whose first joint is a floating base."""
+        return cls(name or model.name or "robot", model.copy())
+
+    @classmethod
+    def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
+        """Build the model of a description."""
+        model = build_model(description)
+        return cls(name or model.name or "robot", model, description)
+
+    def keeping(self, joints: Iterable[str]) -> Robot:
+        """The same robot with every other joint locked at zero.
+
+        Args:
+            joints: names of the joints that stay free.
+
+        Raises:
+            UnknownNameError: a joint is not in the model.
+        """
+        kept = set(joints)
+        for joint in kept:
+            self.joint_id(joint)
+        locked = [i for i in range(2, self.model.njoints) if self.model.names[i] not in kept]
+        reduced = pin.buildReducedModel(self.model, locked, pin.neutral(self.model))
+        return replace(self, model=reduced)
+
+    @property
+    def mass(self) -> float:
+        """Total mass [kg]."""
+        return float(sum(body.mass for body in self.model.inertias))
+
+    @property
+    def weight(self) -> float:
+        """Magnitude of the weight [N]."""
+        return self.mass * float(np.linalg.norm(self.model.gravity.linear))
+
+    @property
+    def base_nv(self) -> int:
+        """Degrees of freedom of the base: 6, or 3 for a planar robot."""
+        return int(self.model.joints[1].nv)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the actuated joints, in the model's order."""
+        return tuple(self.model.names)[2:]
+
+    @property
+    def torque_names(self) -> tuple[str, ...]:
+        """One label per entry of the torques: the joint, with an index where it has several."""
+        labels: list[str] = []
+        for joint, name in zip(list(self.model.joints)[2:], self.joint_names, strict=True):
+            labels += [name] if joint.nv == 1 else [f"{name}[{i}]" for i in range(joint.nv)]
+        return tuple(labels)
+
+    @property
+    def velocity_names(self) -> tuple[str, ...]:
+        """One label per entry of a velocity: the base in its own frame, then the joints."""
+        six = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
+        base = six if self.base_nv == 6 else ("base_vx", "base_vy", "base_w")
+        return base + self.torque_names
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of every frame in the model."""
+        return tuple(frame.name for frame in self.model.frames)
+
+    def joint_id(self, name: str) -> int:
+        """Index of an actuated joint in the model, or an error that lists the valid ones."""
+        if name not in self.joint_names:
+            raise UnknownNameError(f"joint in robot {self.name!r}", name, self.joint_names)
+        return int(self.model.getJointId(name))
+
+    def velocity_index(self, joint: str) -> int:
+        """Where a one-degree-of-freedom joint stands in a velocity vector."""
+        model_joint = self.model.joints[self.joint_id(joint)]
+        if model_joint.nv != 1:
+            raise InvalidInputError(
+                f"joint {joint!r} has {model_joint.nv} degrees of freedom: it has no single angle. "
+                "Name a revolute or prismatic joint."
+            )
+        return int(model_joint.idx_v)
+
+    def joint_position(self, q: Float[np.ndarray, " nq"], joint: str) -> float:
+        """Position [rad or m] of a one-degree-of-freedom joint at a configuration."""
+        self.velocity_index(joint)
+        model_joint = self.model.joints[self.joint_id(joint)]
+        here = q[model_joint.idx_q : model_joint.idx_q + model_joint.nq]
+        # A continuous joint is stored as (cos, sin).
+        return float(np.arctan2(here[1], here[0]) if model_joint.nq == 2 else here[0])
+
+    def frame(self, name: str) -> pin.Frame:
+        """A frame of the model, or an error that lists the valid ones."""
+        if name not in self.frame_names:
+            raise UnknownNameError(f"frame in robot {self.name!r}", name, self.frame_names)
+        return self.model.frames[self.model.getFrameId(name)]
+
+    def configuration(
+        self, angles: Mapping[str, float] | None = None, *, base_yaw: float = 0.0
+    ) -> Float[np.ndarray, " nq"]:
+        """A configuration from named joint positions; joints not named stand at zero.
+
+        Args:
+            angles: joint name -> position [rad, or m for a prismatic joint].
+            base_yaw: rotation of the base about the vertical [rad].
+
+        Raises:
+            UnknownNameError: a joint is not in the model.
+        """
+        displacement = np.zeros(self.model.nv)
+        for joint, angle in (angles or {}).items():
+            displacement[self.velocity_index(joint)] = angle
+        if base_yaw:
+            displacement[5] = base_yaw
+        return pin.integrate(self.model, pin.neutral(self.model), displacement)
+
+    def check_configuration(self, q: object) -> Float[np.ndarray, " nq"]:
+        """A read-only copy of a configuration that is finite, of the right size and normalised.
+
+        Raises:
+            InvalidInputError: wrong shape, NaN or infinity, or an unnormalised quaternion.
+        """
+        try:
+            array = np.array(q, dtype=float)
+        except (TypeError, ValueError):
+            raise InvalidInputError("the configuration q is not an array of numbers") from None
+        if array.shape != (self.model.nq,):
+            raise InvalidInputError(
+                f"the configuration q of robot {self.name!r} has shape ({self.model.nq},): base "
+                f"position, quaternion (x, y, z, w), then {len(self.joint_names)} joints; "
+                f"got shape {array.shape}."
+            )
+        if not np.all(np.isfinite(array)):
+            where = ", ".join(str(i) for i in np.flatnonzero(~np.isfinite(array)))
+            raise InvalidInputError(f"the configuration q is not finite at index {where}.")
+        if not pin.isNormalized(self.model, array, 1e-6):
+            raise InvalidInputError(
+                "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
+                "length. Order is x, y, z, w; pin.normalize(model, q) mends rounding."
+            )
+        array = pin.normalize(self.model, array)
+        array.flags.writeable = False
+        return array
+
+
+def build_model(description: Description) -> pin.Model:
+    """The Pinocchio model of a description, with a floating base."""
+    try:
+        if description.language == "urdf":
+            return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
+        with mjcf_file(description) as path:
+            model = pin.buildModelFromMJCF(path)
+            if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
+                return model
+            return pin.buildModelFromMJCF(path, pin.JointModelFreeFlyer(), "root_joint")[0]
+    except (ValueError, RuntimeError) as error:
+        what = description.path or "the text given"
+        reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
+        raise ModelLoadError(
+            f"{what} is no {description.language.upper()} that can be read: {reason}"
+        ) from None
+
+
+class mjcf_file:  # noqa: N801 - a context manager, used like a function
+    """A path that holds an MJCF text: its own file, or a temporary one (the parser wants a path)."""
+
+    def __init__(self, description: Description) -> None:
+        """Remember what to write."""
+        self.description = description
+        self.folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def __enter__(self) -> str:
+        """Return the path."""
+        if self.description.path is not None:
+            return str(self.description.path)
+        self.folder = tempfile.TemporaryDirectory()
+        path = Path(self.folder.name) / "model.xml"
+        path.write_text(self.description.text, encoding="utf-8")
+        return str(path)
+
+    def __exit__(self, *_: object) -> None:
+        """Remove the temporary file."""
+        if self.folder is not None:
+            self.folder.cleanup()
+
+
+def _read_description(
+    source: str | Path, language: Literal["urdf", "mjcf"], package_dirs: Iterable[str | Path]
+) -> Description:
+    is_text = isinstance(source, str) and source.lstrip().startswith("<")
+    path = None if is_text else Path(source)
+    if path is not None and not path.is_file():
+        raise ModelLoadError(
+            f"no file at {path}. Give the path of a {language.upper()} file, or its text."
+        )
+    try:
+        text = str(source) if path is None else path.read_text(encoding="utf-8")
+        root = ET.fromstring(text.encode())
+    except (UnicodeDecodeError, ET.ParseError) as error:
+        raise ModelLoadError(f"{path or 'the text given'} is not XML: {error}") from None
+    expected = {"urdf": "robot", "mjcf": "mujoco"}[language]
+    if root.tag != expected:
+        raise ModelLoadError(
+            f"{path or 'the text given'} starts with <{root.tag}>; "
+            f"a {language.upper()} starts with <{expected}>."
+        )
+    dirs = tuple(str(folder) for folder in package_dirs)
+    return Description(text, language, dirs, path)

@@ -1,0 +1,230 @@
+"""Sensitivity: how fast each centre of pressure moves when the posture does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.cop import contact_cops, half_planes
+from copsense.criterion import Criterion
+from copsense.equilibrium import StaticEquilibrium, WrenchLaw, solve_equilibrium
+from copsense.errors import InvalidInputError, SensitivityMismatchError
+from copsense.posture import retract
+from copsense.stance import Stance
+
+_STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
+_LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
+
+
+@dataclass(frozen=True, eq=False)
+class CopSensitivity:
+    """The static centre-of-pressure sensitivity of a stance ([Romano2016] Eq. (11)).
+
+    Attributes:
+        equilibrium: the equilibrium differentiated.
+        basis: admissible motions Z (nv, p) that the raw matrices refer to, orthonormal columns.
+        cop: centres of pressure (nc, 2), contact axes [m].
+        raw: eta = d cop / d xi along the columns of the basis (nc, 2, p).
+        wrench_derivative: d wrenches (nc, 6, p), contact axes.
+        torque_derivative: d torques (n, p).
+    """
+
+    equilibrium: StaticEquilibrium
+    basis: Float[np.ndarray, "nv p"]
+    cop: Float[np.ndarray, "nc 2"]
+    raw: Float[np.ndarray, "nc 2 p"]
+    wrench_derivative: Float[np.ndarray, "nc 6 p"]
+    torque_derivative: Float[np.ndarray, "n p"]
+
+    @cached_property
+    def gradient(self) -> Float[np.ndarray, "nc 2 nv"]:
+        """The sensitivity as a gradient over velocities, projected on the admissible motions.
+
+        Free of the choice of basis: its product with an admissible motion is that motion's rate.
+        """
+        return self.raw @ self.basis.T
+
+    def along(self, tangent: ArrayLike, rate: float = 1.0) -> Float[np.ndarray, "nc 2"]:
+        """d cop / d coordinate along a path.
+
+        Args:
+            tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6.
+            rate: d coordinate along that tangent, such as a joint's entry of it.
+
+        Raises:
+            InvalidInputError: the motion moves a contact, or the coordinate stands still.
+        """
+        t = np.asarray(tangent, dtype=float)
+        stance = self.equilibrium.stance
+        if t.shape != (len(self.basis),) or not np.all(np.isfinite(t)):
+            raise InvalidInputError(f"the tangent must be finite, of shape ({len(self.basis)},).")
+        if np.abs(stance.jacobian @ t).max() > 1e-6 * max(1.0, float(np.abs(t).max())):
+            raise InvalidInputError(
+                "the tangent moves a contact. Project it: Z @ (Z.T @ t), Z = "
+                "stance.admissible_motions."
+            )
+        if not abs(rate) > 1e-12 * max(1.0, float(np.abs(t).max())):
+            raise InvalidInputError(
+                "the coordinate does not change along this path: no derivative with respect to it."
+            )
+        return self.gradient @ t / rate
+
+    def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
+        """d cop / d joint [m/rad] along a path with this tangent."""
+        index = self.equilibrium.stance.robot.velocity_index(joint)
+        return self.along(tangent, float(np.asarray(tangent)[index]))
+
+    @cached_property
+    def com_motions(self) -> Float[np.ndarray, "nv 2"]:
+        """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
+
+        v = Z S J_c' (J_c S J_c')^-1 with S = (Z' M Z)^-1, J_c = J_com,xy Z. Where the contacts
+        forbid a horizontal direction (the planar four-bar), its part is zero.
+        """
+        stance, Z = self.equilibrium.stance, self.basis
+        Jc = stance.com_jacobian[:2] @ Z
+        SJ = scipy.linalg.solve(Z.T @ stance.mass_matrix @ Z, Jc.T, assume_a="pos")
+        return np.asarray(Z @ SJ @ np.linalg.pinv(Jc @ SJ, rcond=_LOST, hermitian=True))
+
+    @cached_property
+    def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
+        """Gamma = d cop / d CoM, dimensionless, independent of the chart.
+
+        Rows: CoP x, y in contact axes; columns: CoM x, y in world axes.
+        """
+        return self.gradient @ self.com_motions
+
+    @cached_property
+    def worst_case_gain(self) -> Float[np.ndarray, " nc"]:
+        """Largest CoP speed over motions of given kinetic energy, times sqrt(mass).
+
+        sqrt(m) sigma_max(eta (Z' M Z)^(-1/2)), dimensionless: metres of CoP per metre that the
+        whole mass would move.
+        """
+        stance, Z = self.equilibrium.stance, self.basis
+        factor = np.linalg.cholesky(Z.T @ stance.mass_matrix @ Z)
+        scaled = [scipy.linalg.solve_triangular(factor, eta.T, lower=True).T for eta in self.raw]
+        return np.sqrt(stance.robot.mass) * np.array([np.linalg.norm(eta, 2) for eta in scaled])
+
+    @cached_property
+    def com_travel(self) -> Float[np.ndarray, " nc"]:
+        """How far the CoM may move before a contact tips, to first order [m].
+
+        Least over the sole's edges of margin / |a' Gamma|, a the edge's normal: signed as the
+        margin (negative where the CoP is off the sole already), infinite where the CoP does not
+        move (a point contact, or a contact without a polygon).
+        """
+        travel = np.full(len(self.cop), np.inf)
+        for k, contact in enumerate(self.equilibrium.stance.contacts):
+            if contact.polygon is None or contact.kind == "point":
+                continue
+            normals, offsets = half_planes(contact.polygon)
+            margins = offsets - normals @ self.cop[k]
+            speeds = np.linalg.norm(normals @ self.com_gain[k], axis=1)
+            moving = speeds > 1e-12
+            if np.any(moving):
+                travel[k] = np.min(margins[moving] / speeds[moving])
+            if np.any(margins[~moving] < 0):
+                travel[k] = -np.inf
+        return travel
+
+
+def cop_sensitivity(
+    stance: Stance, criterion: Criterion | WrenchLaw, *, step: float = _STEP
+) -> CopSensitivity:
+    """The sensitivity of every contact's centre of pressure along the admissible motions.
+
+    Analytic for a `Criterion`; for a law q -> wrenches by fourth-order central differences along
+    the constraint manifold.
+
+    Args:
+        stance: robot, configuration and contacts.
+        criterion: a `Criterion`, or a callable q -> wrenches (nc, 6) in contact axes.
+        step: displacement of the differences [rad, m]; a criterion takes none.
+
+    Raises:
+        UnloadedContactError: a contact carries no normal force.
+        UndeterminedWrenchError: the criterion does not determine the wrenches.
+    """
+    if not isinstance(criterion, Criterion):
+        return finite_difference_sensitivity(stance, criterion, step=step)
+    equilibrium = solve_equilibrium(stance, criterion)
+    Z = stance.admissible_motions
+    forces, torques = equilibrium.derivative(Z)
+    return _sensitivity(equilibrium, Z, stance.unstack(forces), torques)
+
+
+def finite_difference_sensitivity(
+    stance: Stance, criterion: Criterion | WrenchLaw, *, step: float = _STEP
+) -> CopSensitivity:
+    """The same sensitivity from equilibria alone: (8 (g(h) - g(-h)) - (g(2h) - g(-2h))) / 12h.
+
+    Each equilibrium is solved at a posture moved along a basis vector and pulled back onto the
+    manifold.
+    """
+    if not (np.isfinite(step) and step > 0):
+        raise InvalidInputError(f"the step must be positive, got {step}.")
+    Z = stance.admissible_motions
+    wrenches, torques = [], []
+    for z in Z.T:
+        at = {s: solve_equilibrium(retract(stance, s * step * z), criterion) for s in (-2, -1, 1, 2)}
+        wrenches.append(
+            (8 * (at[1].wrenches - at[-1].wrenches) - (at[2].wrenches - at[-2].wrenches))
+            / (12 * step)
+        )
+        torques.append(
+            (8 * (at[1].torques - at[-1].torques) - (at[2].torques - at[-2].torques)) / (12 * step)
+        )
+    equilibrium = solve_equilibrium(stance, criterion)
+    return _sensitivity(equilibrium, Z, np.stack(wrenches, -1), np.stack(torques, -1))
+
+
+def check_sensitivity(
+    stance: Stance, criterion: Criterion, *, tolerance: float = 1e-7, step: float = _STEP
+) -> None:
+    """Compare the analytic sensitivity with finite differences at a stance.
+
+    Args:
+        stance: where to compare.
+        criterion: the criterion to differentiate.
+        tolerance: largest difference allowed, relative to the largest entry of each.
+        step: displacement of the differences [rad, m].
+
+    Raises:
+        SensitivityMismatchError: they differ by more; the message says where and by how much.
+    """
+    exact = cop_sensitivity(stance, criterion)
+    numeric = finite_difference_sensitivity(stance, criterion, step=step)
+    pairs = {
+        "centre of pressure": (exact.raw, numeric.raw),
+        "wrench": (exact.wrench_derivative, numeric.wrench_derivative),
+        "torque": (exact.torque_derivative, numeric.torque_derivative),
+    }
+    for what, (a, b) in pairs.items():
+        scale = max(float(np.abs(a).max(initial=0.0)), 1e-300)
+        error = float(np.abs(a - b).max(initial=0.0)) / scale
+        if error > tolerance and scale > 1e-12:
+            raise SensitivityMismatchError(
+                f"the analytic derivative of the {what} differs from finite differences by "
+                f"{error:.2e} relative, over {tolerance:.0e}. Near a contact that unloads or a "
+                "straight leg, try a smaller step; elsewhere please report it."
+            )
+
+
+def _sensitivity(
+    equilibrium: StaticEquilibrium,
+    basis: np.ndarray,
+    wrench_derivative: np.ndarray,
+    torque_derivative: np.ndarray,
+) -> CopSensitivity:
+    """Quotient rule: dp = (d(-m_y, m_x) - p df_z) / f_z."""
+    p, dw = contact_cops(equilibrium), wrench_derivative
+    moments = np.stack([-dw[:, 4], dw[:, 3]], axis=1)
+    normal = equilibrium.wrenches[:, 2]
+    raw = (moments - p[:, :, None] * dw[:, None, 2]) / normal[:, None, None]
+    return CopSensitivity(equilibrium, basis, p, raw, dw, torque_derivative)
