@@ -35,6 +35,7 @@ myst_heading_anchors = 3
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["gallery/**/*.ipynb"]
 
+default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
@@ -44,12 +45,14 @@ napoleon_use_ivar = True
 python_use_unqualified_type_names = True
 
 # Types that are documented elsewhere: without the network there is nothing to link them to.
+ELSEWHERE = (
+    *("coal", "collections", "dataclasses", "jaxtyping", "matplotlib", "np", "numpy", "pathlib"),
+    *("pin", "pinocchio", "scipy", "typing", "xarray"),
+)
 nitpick_ignore_regex = [
-    (
-        r"py:.*",
-        r"(builtins|collections|numpy|np|pathlib|pin|pinocchio|xarray|xr|matplotlib|jaxtyping|typing)"
-        r"(\..*)?",
-    ),
+    (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
+    # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
+    (r"py:.*", r"ndarray|'[^']*'|tuple\[.*"),
 ]
 
 sphinx_gallery_conf = {
@@ -96,6 +99,15 @@ def as_mathml(node: nodes.Element, *, as_block: bool) -> str:
         return ""
 
 
+def keep_sentence(
+    app: Sphinx, what: str, name: str, subject: object, options: object, lines: list[str]
+) -> None:
+    """Stop napoleon from reading "Names: a list." on a property as a type and its description."""
+    if what in {"attribute", "data", "property"}:
+        lines[:0] = ["..", ""]  # an empty comment: the first line has no colon any more
+
+
 def setup(app: Sphinx) -> None:
-    """Register the MathML renderer."""
+    """Register the MathML renderer and what prepares docstrings."""
+    app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))
