@@ -38,6 +38,7 @@ exclude_patterns = ["gallery/**/*.ipynb"]
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -52,7 +53,7 @@ ELSEWHERE = (
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
-    (r"py:.*", r"ndarray|'[^']*'|tuple\[.*"),
+    (r"py:.*", r"ArrayLike|ndarray|'[^']*'|tuple\[.*"),
 ]
 
 sphinx_gallery_conf = {
