@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
@@ -53,7 +54,7 @@ ELSEWHERE = (
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
-    (r"py:.*", r"ArrayLike|ndarray|'[^']*'|tuple\[.*"),
+    (r"py:.*", r"ArrayLike|TypeAliasForwardRef|ndarray|'[^']*'|tuple\[.*"),
 ]
 
 sphinx_gallery_conf = {
@@ -108,7 +109,22 @@ def keep_sentence(
         lines[:0] = ["..", ""]  # an empty comment: the first line has no colon any more
 
 
+def name_aliases(
+    app: Sphinx,
+    what: str,
+    name: str,
+    subject: object,
+    options: object,
+    signature: str | None,
+    returns: str | None,
+) -> tuple[str | None, str | None]:
+    """Write the alias ArrayLike as that, inside other types too."""
+    forward = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+    return signature and forward.sub(r"\1", signature), returns and forward.sub(r"\1", returns)
+
+
 def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings."""
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
+    app.connect("autodoc-process-signature", name_aliases)
     app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))
