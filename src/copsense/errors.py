@@ -99,3 +99,7 @@ class UnreachablePostureError(CopsenseError):
 
 class SensitivityMismatchError(CopsenseError):
     """An analytic sensitivity disagrees with finite differences."""
+
+
+class OutputError(CopsenseError):
+    """A file cannot be written where it was asked for, or would overwrite another."""

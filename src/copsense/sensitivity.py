@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
@@ -18,6 +17,7 @@ from copsense.posture import retract
 from copsense.stance import Stance
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
+_MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 
 
@@ -83,13 +83,22 @@ class CopSensitivity:
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
         """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
 
-        v = Z S J_c' (J_c S J_c')^-1 with S = (Z' M Z)^-1, J_c = J_com,xy Z. Where the contacts
-        forbid a horizontal direction (the planar four-bar), its part is zero.
+        v = Z S J_c' (J_c S J_c')^-1 = Z R (J_c R)^+ with S = (Z' M Z)^-1 = R R' and
+        J_c = J_com,xy Z. Where the contacts forbid a horizontal direction (the planar four-bar),
+        its part is zero.
         """
-        stance, Z = self.equilibrium.stance, self.basis
-        Jc = stance.com_jacobian[:2] @ Z
-        SJ = scipy.linalg.solve(Z.T @ stance.mass_matrix @ Z, Jc.T, assume_a="pos")
-        return np.asarray(Z @ SJ @ np.linalg.pinv(Jc @ SJ, rcond=_LOST, hermitian=True))
+        Jc = self.equilibrium.stance.com_jacobian[:2] @ self.basis
+        R = self._inverse_root
+        return np.asarray(self.basis @ R @ np.linalg.pinv(Jc @ R, rcond=_LOST))
+
+    @cached_property
+    def _inverse_root(self) -> Float[np.ndarray, "p r"]:
+        """R with R R' = (Z' M Z)^-1, leaving out motions of massless links alone: they have no
+        energy to be measured by, and move no centre of mass."""
+        energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
+        values, vectors = np.linalg.eigh(energy)
+        kept = values > _MASSLESS * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
     @cached_property
     def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
@@ -106,10 +115,8 @@ class CopSensitivity:
         sqrt(m) sigma_max(eta (Z' M Z)^(-1/2)), dimensionless: metres of CoP per metre that the
         whole mass would move.
         """
-        stance, Z = self.equilibrium.stance, self.basis
-        factor = np.linalg.cholesky(Z.T @ stance.mass_matrix @ Z)
-        scaled = [scipy.linalg.solve_triangular(factor, eta.T, lower=True).T for eta in self.raw]
-        return np.sqrt(stance.robot.mass) * np.array([np.linalg.norm(eta, 2) for eta in scaled])
+        speeds = [np.linalg.norm(eta @ self._inverse_root, 2) for eta in self.raw]
+        return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
     @cached_property
     def com_travel(self) -> Float[np.ndarray, " nc"]:

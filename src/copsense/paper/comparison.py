@@ -48,7 +48,7 @@ def angle_at(four_bar: FourBar, travel: float) -> float:
     reach = four_bar.kappa * four_bar.leg_length
     if not abs(travel) < reach:
         raise InvalidInputError(
-            f"the CoM cannot travel {travel:g} m from the centre: its reach kappa l is {reach:g} m. "
+            f"the CoM cannot travel {travel:g} m from the centre: kappa l is {reach:g} m. "
             "Give a FourBar with a shorter rod or longer legs."
         )
     # u = kappa l cos(xi)

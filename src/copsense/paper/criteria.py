@@ -30,13 +30,13 @@ class FourBarCriterion:
 
 
 def _wrench_share(four_bar: FourBar, parameters: Mapping[str, float]) -> float:
-    """a = w d² / (w d² + 4) with w = 1/L², written so that no square overflows."""
+    """Share a = w d² / (w d² + 4) with w = 1/L², written so that no square overflows."""
     d, L = four_bar.rod_length, parameters["characteristic_length"]
     return (d / math.hypot(d, 2.0 * L)) ** 2
 
 
 def _torque_share(four_bar: FourBar, parameters: Mapping[str, float]) -> float:
-    """a = w_a / (w_a + w_h), which minimises w_h a² + w_a (1 - a)²."""
+    """Share a = w_a / (w_a + w_h), which minimises w_h a² + w_a (1 - a)²."""
     return 1.0 / (1.0 + parameters["hip_weight"] / parameters["ankle_weight"])
 
 

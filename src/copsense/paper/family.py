@@ -99,8 +99,8 @@ def leg_angle(xi: object) -> float:
     angle = finite_number("xi", xi)
     if abs(math.sin(angle)) < _COLLAPSED:
         raise InvalidInputError(
-            f"the linkage is collapsed at xi={angle!r}: sin(xi) = 0, the legs lie on the ground and "
-            "the internal force diverges. Keep xi between 0 and pi, pi/2 being upright."
+            f"the linkage is collapsed at xi={angle!r}: sin(xi) = 0, the legs lie on the "
+            "ground and the internal force diverges. Keep xi between 0 and pi, pi/2 being upright."
         )
     return angle
 
@@ -134,7 +134,8 @@ def solve_four_bar_member(
     # f_y(±x) = m g (1/2 ± a u/d), mu = (1 - a) Q / 2
     loads = 0.5 + side * a * u / d
     unloaded = tuple(
-        name for name, load in zip(("left foot", "right foot"), loads, strict=True)
+        name
+        for name, load in zip(("left foot", "right foot"), loads, strict=True)
         if abs(load) < _UNLOADED
     )
     if unloaded:

@@ -65,7 +65,7 @@ class FourBar:
 
     @property
     def weight(self) -> float:
-        """m g [N]."""
+        """Weight m g [N]."""
         return self.mass * self.gravity
 
     @property

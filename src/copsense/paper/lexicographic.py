@@ -1,4 +1,4 @@
-"""minimise_in_order: quadratic objectives on the four-bar's statics, each breaking the last's ties."""
+"""minimise_in_order: objectives on the four-bar's statics, each breaking the last's ties."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Linkage:
     hand: Hand = Hand.LEFT_AT_MINUS_X
 
     def standing(self, xi: float) -> Float[np.ndarray, "7"]:
-        """q = chi(xi), [Romano2016] Eq. (14), the foot at -x at the origin [m, rad]."""
+        """Posture q = chi(xi), [Romano2016] Eq. (14), the foot at -x at the origin [m, rad]."""
         l, d = self.four_bar.leg_length, self.four_bar.rod_length
         return np.array(
             [d / 2 + l * np.cos(xi), l * np.sin(xi), 0.0, xi, np.pi - xi, xi, np.pi - xi]
@@ -96,7 +96,7 @@ def _derivative(
     function: Callable[[Complex[np.ndarray, "n"]], Complex[np.ndarray, "m"]],
     q: Float[np.ndarray, "n"],
 ) -> Float[np.ndarray, "m n"]:
-    """d function / dq by the complex step, exact to rounding."""
+    """Derivative d function / dq by the complex step, exact to rounding."""
     steps = q + 1j * _STEP * np.eye(q.size)
     return np.column_stack([function(row).imag / _STEP for row in steps])
 

@@ -49,8 +49,7 @@ def mass_matrix_coupling(four_bar: FourBar, xi: float) -> Float[np.ndarray, "3 4
     left = (l**2 * s1**2 - l * c1 * (d - l * c1)) / 2
     right = (l**2 * s3**2 + l * c3 * (d + l * c3)) / 2
     return np.asarray(
-        m_l / 2
-        * np.array([[l * s1, 0, l * s3, 0], [-l * c1, 0, -l * c3, 0], [left, 0, right, 0]])
+        m_l / 2 * np.array([[l * s1, 0, l * s3, 0], [-l * c1, 0, -l * c3, 0], [left, 0, right, 0]])
     )
 
 
@@ -74,7 +73,7 @@ def right_foot_jacobian(four_bar: FourBar, xi: float) -> Float[np.ndarray, "3 7"
 
 
 def configuration(four_bar: FourBar, xi: float) -> Float[np.ndarray, "7"]:
-    """q = chi(xi), [Romano2016] Eq. (14) [m, rad]."""
+    """Posture q = chi(xi), [Romano2016] Eq. (14) [m, rad]."""
     l, d = four_bar.leg_length, four_bar.rod_length
     e1, e2 = np.eye(2)
     base = d * e1 / 2 + l * np.sin(xi) * e2 + l * np.cos(xi) * e1
@@ -182,9 +181,9 @@ PRINTED_FORMS: Mapping[str, PrintedForm] = MappingProxyType(
             PrintedForm("J_CL", "left foot's Jacobian (3, 7)", _S_PLUS, left_foot_jacobian),
             PrintedForm("J_CR", "right foot's Jacobian (3, 7)", _S_PLUS, right_foot_jacobian),
             PrintedForm("(14)", "q = chi(xi) (7,) [m, rad]", _S_PLUS, configuration),
-            PrintedForm("(15)", "wrenches (2, 3) [N, N m]", _S_MINUS, minimum_wrench_wrenches, _K35),
+            PrintedForm("(15)", "f (2, 3) [N, N m]", _S_MINUS, minimum_wrench_wrenches, _K35),
             PrintedForm("(16)", "eta (2,) [m/rad]", _S_PLUS, minimum_wrench_sensitivity, _K35),
-            PrintedForm("(17)", "wrenches (2, 3) [N, N m]", _S_PLUS, minimum_torque_wrenches, _K34),
+            PrintedForm("(17)", "f (2, 3) [N, N m]", _S_PLUS, minimum_torque_wrenches, _K34),
             PrintedForm("(18)", "eta (2,) [m/rad]", _S_PLUS, minimum_torque_sensitivity, _K35),
             PrintedForm("(29)", "Delta (2,) [N]", _S_PLUS, torque_redundancy),
             PrintedForm(

@@ -1,0 +1,113 @@
+"""Static centre-of-pressure sensitivity for legged robots.
+
+The public names, in the order of the flow: a robot stands on contacts (a stance); a criterion
+shares its load among them (an equilibrium); each contact has a centre of pressure, and a
+sensitivity of it; a sweep evaluates many.
+"""
+
+from copsense._version import __version__
+from copsense.contact import Contact, Plane, rectangle
+from copsense.cop import (
+    EdgeMargin,
+    center_of_pressure,
+    com_projection,
+    contact_cops,
+    edge_margin,
+    foot_rotation_indicator,
+    total_center_of_pressure,
+    zero_moment_point,
+)
+from copsense.criterion import (
+    CRITERIA,
+    Criterion,
+    TorqueTerm,
+    WrenchTerm,
+    criterion_named,
+    minimum_tangential,
+    minimum_torque,
+    minimum_wrench,
+    mixed,
+    reference_wrench,
+    weighted_torque,
+)
+from copsense.equilibrium import StaticEquilibrium, solve_equilibrium, wrench_law
+from copsense.errors import CopsenseError
+from copsense.motion import Path, joint_sweep, lateral_sweep, path_through
+from copsense.posture import Posture, PostureCost, retract, solve_posture
+from copsense.robot import Robot
+from copsense.robots import (
+    PRESETS,
+    four_bar_angles,
+    four_bar_robot,
+    load_robot,
+    load_stance,
+    sole_notes,
+    stand,
+)
+from copsense.sensitivity import (
+    CopSensitivity,
+    check_sensitivity,
+    cop_sensitivity,
+    finite_difference_sensitivity,
+)
+from copsense.sole import Sole, read_sole
+from copsense.stance import Stance
+from copsense.storage import load_results, write_results
+from copsense.sweep import failed_rows, sweep
+
+__all__ = [
+    "CRITERIA",
+    "PRESETS",
+    "Contact",
+    "CopSensitivity",
+    "CopsenseError",
+    "Criterion",
+    "EdgeMargin",
+    "Path",
+    "Plane",
+    "Posture",
+    "PostureCost",
+    "Robot",
+    "Sole",
+    "Stance",
+    "StaticEquilibrium",
+    "TorqueTerm",
+    "WrenchTerm",
+    "__version__",
+    "center_of_pressure",
+    "check_sensitivity",
+    "com_projection",
+    "contact_cops",
+    "cop_sensitivity",
+    "criterion_named",
+    "edge_margin",
+    "failed_rows",
+    "finite_difference_sensitivity",
+    "foot_rotation_indicator",
+    "four_bar_angles",
+    "four_bar_robot",
+    "joint_sweep",
+    "lateral_sweep",
+    "load_results",
+    "load_robot",
+    "load_stance",
+    "minimum_tangential",
+    "minimum_torque",
+    "minimum_wrench",
+    "mixed",
+    "path_through",
+    "read_sole",
+    "rectangle",
+    "reference_wrench",
+    "retract",
+    "sole_notes",
+    "solve_equilibrium",
+    "solve_posture",
+    "stand",
+    "sweep",
+    "total_center_of_pressure",
+    "weighted_torque",
+    "wrench_law",
+    "write_results",
+    "zero_moment_point",
+]

@@ -1,0 +1,69 @@
+"""The paper's four-bar in closed form, its printed formulas, errata, claims and figures.
+
+F. Romano, D. Pucci, S. Traversaro, F. Nori, "The Static Center of Pressure Sensitivity: a further
+Criterion to assess Contact Stability and Balancing Controllers", arXiv:1610.01495.
+"""
+
+from __future__ import annotations
+
+from copsense.paper.claim import (
+    CheckedClaim,
+    Claim,
+    EvaluatedClaim,
+    Finding,
+    Verdict,
+    evaluate_claims,
+    judge,
+)
+from copsense.paper.claims import FOUR_BAR_CLAIMS, evaluate_four_bar_claims
+from copsense.paper.comparison import Discrepancy
+from copsense.paper.criteria import FOUR_BAR_CRITERIA, FourBarCriterion, solve_four_bar
+from copsense.paper.errata import ERRATA, Erratum, EvaluatedErratum, evaluate_errata
+from copsense.paper.family import FourBarSolution, solve_four_bar_member
+from copsense.paper.figures import (
+    Curve,
+    FigureData,
+    Sampling,
+    Segment,
+    figure_3a,
+    figure_3b,
+    figure_4,
+    figure_5,
+)
+from copsense.paper.four_bar import FourBar
+from copsense.paper.linkage import Hand
+from copsense.paper.printed import PRINTED_FORMS, PrintedForm
+
+__all__ = [
+    "ERRATA",
+    "FOUR_BAR_CLAIMS",
+    "FOUR_BAR_CRITERIA",
+    "PRINTED_FORMS",
+    "CheckedClaim",
+    "Claim",
+    "Curve",
+    "Discrepancy",
+    "Erratum",
+    "EvaluatedClaim",
+    "EvaluatedErratum",
+    "FigureData",
+    "Finding",
+    "FourBar",
+    "FourBarCriterion",
+    "FourBarSolution",
+    "Hand",
+    "PrintedForm",
+    "Sampling",
+    "Segment",
+    "Verdict",
+    "evaluate_claims",
+    "evaluate_errata",
+    "evaluate_four_bar_claims",
+    "figure_3a",
+    "figure_3b",
+    "figure_4",
+    "figure_5",
+    "judge",
+    "solve_four_bar",
+    "solve_four_bar_member",
+]

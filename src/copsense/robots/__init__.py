@@ -1,0 +1,25 @@
+"""Robots that copsense knows by name, and how any robot comes to stand."""
+
+from copsense.robots.four_bar import four_bar_angles, four_bar_robot
+from copsense.robots.presets import PRESETS, Preset
+from copsense.robots.standing import (
+    ContactGeometryWarning,
+    likely_feet,
+    load_robot,
+    load_stance,
+    sole_notes,
+    stand,
+)
+
+__all__ = [
+    "PRESETS",
+    "ContactGeometryWarning",
+    "Preset",
+    "four_bar_angles",
+    "four_bar_robot",
+    "likely_feet",
+    "load_robot",
+    "load_stance",
+    "sole_notes",
+    "stand",
+]

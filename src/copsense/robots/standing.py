@@ -1,0 +1,261 @@
+"""Standing: from a robot's name, file or model to a stance with its feet on the ground."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from copsense.contact import Contact, Plane
+from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.posture import solve_posture
+from copsense.robot import Robot
+from copsense.robots.presets import PRESETS, Preset, preset_robot
+from copsense.sole import read_sole
+from copsense.stance import Stance
+
+ContactAt = Literal["frame", "sole"]
+_OFF_SOLE = 1e-3  # m: a contact frame farther from the sole's bottom is said to be off it
+
+
+class ContactGeometryWarning(UserWarning):
+    """A contact frame is not on the sole that the collision geometry shows."""
+
+
+def load_robot(
+    source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()
+) -> Robot:
+    """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
+
+    Raises:
+        UnknownNameError: neither a preset nor a file.
+        ModelLoadError: the file cannot be read.
+        MissingExtraError: the preset's package is not installed.
+    """
+    if isinstance(source, pin.Model):
+        return Robot.from_model(source)
+    if str(source) in PRESETS:
+        return preset_robot(PRESETS[str(source)])
+    text = str(source)
+    if text.lstrip().startswith("<"):
+        read = Robot.from_mjcf if "<mujoco" in text else Robot.from_urdf
+        return read(text, package_dirs=package_dirs)
+    path = Path(source)
+    if not path.is_file() and not path.suffix and path.parent == Path():
+        raise UnknownNameError(
+            "robot", text, PRESETS, "Or give the path of a URDF or MJCF file."
+        )
+    if path.is_file() and "<mujoco" in path.read_text(encoding="utf-8", errors="replace"):
+        return Robot.from_mjcf(path, package_dirs=package_dirs)
+    return Robot.from_urdf(path, package_dirs=package_dirs)
+
+
+def load_stance(
+    source: str | Path | Robot | pin.Model,
+    *,
+    contacts: Sequence[str | Contact] | None = None,
+    posture: Mapping[str, float] | None = None,
+    base_rpy: Sequence[float] | None = None,
+    width: float | None = None,
+    contact_at: ContactAt | None = None,
+    package_dirs: Iterable[str | Path] = (),
+) -> Stance:
+    """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
+
+    Args:
+        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``.
+        contacts: frames (taken as surface contacts) or `Contact` values; default the preset's.
+        posture: joint name -> position [rad, or m] that the stance stays nearest to; it replaces
+            the preset's joint by joint.
+        base_rpy: roll, pitch, yaw of the base to start from [rad]; default the preset's.
+        width: lateral distance between two feet [m].
+        contact_at: ``"sole"`` puts each surface contact at the bottom of its collision geometry
+            and reads its polygon; ``"frame"`` keeps it at the model's frame and reads the polygon
+            if it can. Default: as the preset says; ``"sole"`` where a robot of the user's own has
+            collision geometry and the contact has no polygon.
+        package_dirs: folders that hold the packages of ``package://`` meshes.
+
+    Raises:
+        CopsenseError: anything wrong with the input, or no posture that stands.
+    """
+    preset = PRESETS.get(source) if isinstance(source, str) else None
+    robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
+    if contacts is None:
+        if preset is None:
+            raise InvalidInputError(
+                f"robot {robot.name!r} is no preset: name its contact frames. "
+                f"Likely ones: {', '.join(likely_feet(robot)) or 'none found'}."
+            )
+        chosen: tuple[Contact, ...] = preset.contacts
+    else:
+        chosen = tuple(Contact(c) if isinstance(c, str) else c for c in contacts)
+        preset_frames = {c.frame: c for c in preset.contacts} if preset else {}
+        chosen = tuple(
+            preset_frames.get(c, new) if isinstance(c, str) else new
+            for c, new in zip(contacts, chosen, strict=True)
+        )
+    chosen = _complete(robot, chosen, preset, contact_at)
+    angles = {j: float(np.radians(a)) for j, a in preset.posture.items()} if preset else {}
+    q = robot.configuration(angles | dict(posture or {}))
+    rpy = np.radians(preset.base_rpy) if preset and base_rpy is None else np.array(base_rpy or (0, 0, 0))
+    q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
+    return stand(robot, chosen, q, width=width if width is not None or not preset else preset.width)
+
+
+def stand(
+    robot: Robot, contacts: Sequence[Contact], q: ArrayLike, *, width: float | None = None
+) -> Stance:
+    """Put a robot's contacts on their planes with its CoM over their middle.
+
+    Each contact goes to the nearest place on its plane (the ground z = 0 where it has none) with
+    the nearest orientation flat on it; the posture stays nearest to `q`, turned as a whole so that
+    the first surface contact lies flat.
+
+    Args:
+        robot: the robot.
+        contacts: its contacts.
+        q: configuration (nq,) to start from; where the base stands does not matter.
+        width: lateral distance between two contacts [m], or None to leave it.
+
+    Raises:
+        UnreachablePostureError: no such posture.
+    """
+    loose = Stance(robot, np.asarray(q, dtype=float), tuple(contacts), check=False)
+    planar = robot.base_nv != 6
+    first = next((k for k, c in enumerate(contacts) if c.kind == "surface"), None)
+    if first is not None:
+        # Turn the whole robot about the horizontal, so that its first sole is flat.
+        flat = _align(loose.placements[first].rotation[:, 2], _plane(contacts[first]))
+        base = pin.Quaternion(loose.q[3:7]).matrix()
+        loose = loose.at(_turn_base(robot, loose.q, flat @ base), check=False)
+    middle = np.mean([place.translation for place in loose.placements], axis=0)
+    heights = [_height(c, p.translation - middle) for c, p in zip(contacts, loose.placements, strict=True)]
+    loose = loose.at(_shift_base(robot, loose.q, -middle - [0, 0, np.mean(heights)]), check=False)
+    targets = []
+    for k, (contact, place) in enumerate(zip(contacts, loose.placements, strict=True)):
+        flat = np.eye(3) if planar else _align(place.rotation[:, 2], _plane(contact))
+        origin = place.translation.copy()
+        if width is not None:
+            if len(contacts) != 2:
+                raise InvalidInputError(f"a stance width needs two contacts, got {len(contacts)}.")
+            if not (np.isfinite(width) and width > 0):
+                raise InvalidInputError(f"the stance width must be positive [m], got {width}.")
+            left = place.translation[1] >= loose.placements[1 - k].translation[1]
+            origin[:2] = 0.0, width / 2 if left else -width / 2
+        origin[2] -= _height(contact, origin)
+        targets.append(pin.SE3(flat @ place.rotation, origin))
+    centre = np.mean([target.translation for target in targets], axis=0)
+    com = (None if planar else float(centre[0]), float(centre[1]), None)
+    return solve_posture(loose, targets=targets, com=com).stance
+
+
+def sole_notes(stance: Stance) -> tuple[str, ...]:
+    """What is off between the contact frames and the soles, in words; empty where all is well.
+
+    Contacts whose geometry cannot be read are passed over.
+    """
+    notes = []
+    for contact in stance.contacts:
+        if contact.kind != "surface":
+            continue
+        try:
+            sole = read_sole(stance.robot, contact)
+        except CopsenseError:
+            continue
+        over = float(contact.rotation[:, 2] @ np.array(contact.offset)) - sole.height
+        if abs(over) > _OFF_SOLE:
+            notes.append(
+                f"contact {contact.name!r} lies {abs(over) * 1e3:.1f} mm "
+                f"{'over' if over > 0 else 'under'} the bottom of its collision geometry; "
+                "contact_at='sole' (--contact-at sole) puts it there."
+            )
+    return tuple(notes)
+
+
+def likely_feet(robot: Robot) -> tuple[str, ...]:
+    """Frames of a model whose names look like feet."""
+    words = ("sole", "foot", "toe", "ankle_roll")
+    return tuple(n for n in dict.fromkeys(robot.frame_names) if any(w in n.lower() for w in words))
+
+
+def _complete(
+    robot: Robot, contacts: tuple[Contact, ...], preset: Preset | None, at: ContactAt | None
+) -> tuple[Contact, ...]:
+    """Fill in offsets and polygons from the collision geometry."""
+    mode = at or (preset.sole_from_geometry if preset else None)
+    completed = []
+    for contact in contacts:
+        needs = contact.kind == "surface" and (contact.polygon is None or at is not None)
+        if not needs or (preset and mode is None) or (not preset and robot.description is None and not at):
+            completed.append(contact)
+            continue
+        robot.frame(contact.frame)
+        try:
+            sole = read_sole(robot, contact)
+        except ModelLoadError as error:
+            if mode == "sole":
+                raise
+            warnings.warn(
+                f"contact {contact.name!r} has no sole polygon, so no margin to its edge is known: "
+                f"{error}",
+                ContactGeometryWarning,
+                stacklevel=3,
+            )
+            completed.append(contact)
+            continue
+        offset = np.array(contact.offset)
+        if mode == "sole":
+            up = contact.rotation[:, 2]
+            offset = offset + up * (sole.height - up @ offset)
+        elif not preset and abs(sole.height - contact.rotation[:, 2] @ offset) > _OFF_SOLE:
+            warnings.warn(
+                f"frame {contact.frame!r} is {abs(sole.height) * 1e3:.1f} mm from the bottom of "
+                "its collision geometry. Give contact_at='sole' to put the contact there, or "
+                "contact_at='frame' to keep it.",
+                ContactGeometryWarning,
+                stacklevel=3,
+            )
+        completed.append(
+            replace(contact, offset=tuple(float(c) for c in offset), polygon=sole.polygon)
+        )
+    return tuple(completed)
+
+
+def _plane(contact: Contact) -> Plane:
+    return contact.plane or Plane()
+
+
+def _height(contact: Contact, point: np.ndarray) -> float:
+    """How far above a contact's plane a point is, along the vertical (the normal for a wall)."""
+    plane = _plane(contact)
+    n = np.array(plane.normal)
+    return float(n @ (point - np.array(plane.point)) / (n[2] if abs(n[2]) > 0.1 else 1.0))
+
+
+def _align(axis: np.ndarray, plane: Plane) -> np.ndarray:
+    """The smallest rotation (3 x 3) that takes an axis to a plane's normal."""
+    turn = pin.Quaternion.FromTwoVectors(np.array(axis), np.array(plane.normal))
+    return np.asarray(turn.matrix())
+
+
+def _turn_base(robot: Robot, q: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    turned = np.array(q)
+    if robot.base_nv == 6:
+        turned[3:7] = pin.Quaternion(rotation).coeffs()
+    return turned
+
+
+def _shift_base(robot: Robot, q: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    moved = np.array(q)
+    if robot.base_nv == 6:
+        moved[:3] += shift
+    else:
+        # A planar base moves in the axes of its own plane.
+        moved[:2] += (robot.model.jointPlacements[1].rotation.T @ shift)[:2]
+    return moved

@@ -1,0 +1,133 @@
+"""Sole: the part of a foot's collision geometry that meets the ground."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+import coal
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.contact import Contact, convex_polygon
+from copsense.errors import InvalidInputError, ModelLoadError
+from copsense.robot import Robot, build_model, mjcf_file
+
+THICKNESS = 1e-3  # m: what lies within this of the lowest point belongs to the sole
+_RIM = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)  # samples of a round rim
+
+
+@dataclass(frozen=True, eq=False)
+class Sole:
+    """The sole under a frame of the robot's model.
+
+    Attributes:
+        height: height of the lowest point over the frame, along the contact's z [m]; negative
+            when the sole lies under the frame.
+        polygon: convex hull (k, 2) of the lowest millimetre, counter-clockwise, contact axes [m].
+    """
+
+    height: float
+    polygon: Float[np.ndarray, "k 2"]
+
+
+def read_sole(robot: Robot, contact: Contact, *, thickness: float = THICKNESS) -> Sole:
+    """Read a foot's sole from the collision geometry of its link.
+
+    Args:
+        robot: a robot read from URDF or MJCF; its meshes are opened for this link alone.
+        contact: names the frame and, by its rotation, which way is down (-z). Its offset is not
+            applied: the height is over the model's frame.
+        thickness: how near to the lowest point a vertex must be to count as sole [m].
+
+    Raises:
+        ModelLoadError: a mesh is missing, or the link has no collision geometry.
+        InvalidInputError: the robot has no description to read geometry from.
+    """
+    vertices = _foot_vertices(robot, contact)
+    lowest = float(vertices[:, 2].min())
+    sole = vertices[vertices[:, 2] <= lowest + thickness]
+    try:
+        polygon = convex_polygon(sole[:, :2], contact.name)
+    except InvalidInputError:
+        raise ModelLoadError(
+            f"the collision geometry under frame {contact.frame!r} touches the ground in a single "
+            "point: it has no sole. Use a point contact, or give the polygon."
+        ) from None
+    return Sole(lowest, polygon)
+
+
+def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
+    """Vertices of the collision shapes rigidly attached to the contact's frame, contact axes."""
+    description = robot.description
+    if description is None:
+        raise InvalidInputError(
+            f"robot {robot.name!r} was given as a model, without geometry: give each contact its "
+            "polygon, or load the robot from its URDF or MJCF."
+        )
+    model = build_model(description)  # unreduced: geometry hangs on the joints of the file
+    frame = model.frames[model.getFrameId(contact.frame)]
+    joint, axes = frame.parentJoint, frame.placement * pin.SE3(contact.rotation, np.zeros(3))
+    try:
+        if description.language == "urdf":
+            links = {f.name for f in model.frames if f.parentJoint == joint}
+            text = _only_collisions_of(description.text, links)
+            shapes = pin.buildGeomFromUrdfString(
+                model, text, pin.GeometryType.COLLISION, None, list(description.package_dirs)
+            )
+        else:
+            with mjcf_file(description) as path:
+                shapes = pin.buildGeomFromMJCF(model, path, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise ModelLoadError(
+            f"the collision geometry under frame {contact.frame!r} could not be read: "
+            f"{str(error).strip().splitlines()[0]}. Give package_dirs= (--package-dir) for its "
+            "meshes, or the contact's polygon."
+        ) from None
+    found = [
+        np.array([axes.actInv(shape.placement.act(v)) for v in _shape_vertices(shape, axes)])
+        for shape in shapes.geometryObjects
+        if shape.parentJoint == joint
+    ]
+    if not found:
+        raise ModelLoadError(
+            f"no collision geometry is attached to frame {contact.frame!r}: give the contact its "
+            "polygon."
+        )
+    return np.vstack(found)
+
+
+def _shape_vertices(shape: pin.GeometryObject, axes: pin.SE3) -> Float[np.ndarray, "k 3"]:
+    """Points of a shape, in its own frame, among which its lowest ones are."""
+    geometry = shape.geometry
+    if isinstance(geometry, coal.Box):
+        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+        return signs * geometry.halfSide
+    if isinstance(geometry, coal.Cylinder):
+        rim = np.column_stack([np.cos(_RIM), np.sin(_RIM)]) * geometry.radius
+        half = np.full((len(rim), 1), geometry.halfLength)
+        return np.vstack([np.hstack([rim, half]), np.hstack([rim, -half])])
+    if isinstance(geometry, coal.Sphere | coal.Capsule):
+        # The lowest point of a ball lies straight under its centre.
+        down = -(shape.placement.rotation.T @ axes.rotation[:, 2]) * geometry.radius
+        half = geometry.halfLength if isinstance(geometry, coal.Capsule) else 0.0
+        return np.array([[0.0, 0.0, half], [0.0, 0.0, -half]]) + down
+    if isinstance(geometry, coal.BVHModelBase):
+        return np.array(geometry.vertices())
+    if isinstance(geometry, coal.ConvexBase):
+        return np.array(geometry.points())
+    raise ModelLoadError(
+        f"collision shape {shape.name!r} is a {type(geometry).__name__}, of which no sole can be "
+        "read. Give the contact its polygon."
+    )
+
+
+def _only_collisions_of(text: str, links: set[str]) -> str:
+    """The URDF without the collision geometry of other links, so that no other mesh is opened."""
+    root = ET.fromstring(text.encode())
+    for link in root.iter("link"):
+        if link.get("name") not in links:
+            for collision in link.findall("collision"):
+                link.remove(collision)
+    return ET.tostring(root, encoding="unicode")
