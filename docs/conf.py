@@ -48,8 +48,8 @@ python_use_unqualified_type_names = True
 
 # Types that are documented elsewhere: without the network there is nothing to link them to.
 ELSEWHERE = (
-    *("coal", "collections", "dataclasses", "jaxtyping", "matplotlib", "np", "numpy", "pathlib"),
-    *("pin", "pinocchio", "scipy", "typing", "xarray"),
+    *("coal", "collections", "dataclasses", "jaxtyping", "matplotlib", "np", "numpy", "pandas"),
+    *("pathlib", "pin", "pinocchio", "scipy", "typing", "xarray"),
 )
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
