@@ -39,7 +39,9 @@ class Plane:
         """Refuse a plane without direction; store the unit normal."""
         _require(np.all(np.isfinite(self.point)), f"the plane's point {self.point} is not finite")
         length = float(np.linalg.norm(self.normal))
-        _require(np.isfinite(length) and length > 0, f"the plane's normal {self.normal} is no direction")
+        _require(
+            np.isfinite(length) and length > 0, f"the plane's normal {self.normal} is no direction"
+        )
         unit = tuple(float(c) / length for c in self.normal)
         object.__setattr__(self, "normal", unit)
 

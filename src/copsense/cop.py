@@ -84,7 +84,9 @@ def com_projection(stance: Stance, plane: Plane | None = None) -> Float[np.ndarr
     plane = plane or Plane()
     n, down = np.array(plane.normal), stance.robot.model.gravity.linear
     if abs(n @ down) <= 1e-12 * np.linalg.norm(down):
-        raise InvalidInputError("the plane is parallel to gravity: the CoM has no projection on it.")
+        raise InvalidInputError(
+            "the plane is parallel to gravity: the CoM has no projection on it."
+        )
     return np.asarray(stance.com + down * (n @ (np.array(plane.point) - stance.com)) / (n @ down))
 
 

@@ -159,8 +159,7 @@ def minimum_wrench(characteristic_length: float, *, name: str = "minimum-wrench"
         characteristic_length: L [m], positive.
         name: how it is called in results.
     """
-    moment = 1.0 / _positive(characteristic_length, "the characteristic length L") ** 2
-    return Criterion(name, (WrenchTerm(np.array([1.0, 1.0, 1.0, moment, moment, moment])),))
+    return Criterion(name, (WrenchTerm(_norm_weights(characteristic_length)),))
 
 
 def minimum_torque(
@@ -207,8 +206,8 @@ def reference_wrench(
         characteristic_length: L [m] of the norm.
         name: how it is called in results.
     """
-    norm = minimum_wrench(characteristic_length).terms[0]
-    return Criterion(name, (replace(norm, reference=np.array(reference, dtype=float)),))
+    weights = _norm_weights(characteristic_length)
+    return Criterion(name, (WrenchTerm(weights, np.array(reference, dtype=float)),))
 
 
 def mixed(
@@ -252,6 +251,11 @@ def criterion_named(name: str, characteristic_length: float = 1.0) -> Criterion:
     if name not in CRITERIA:
         raise UnknownNameError("criterion", name, CRITERIA)
     return CRITERIA[name](characteristic_length)
+
+
+def _norm_weights(characteristic_length: float) -> Float[np.ndarray, " 6"]:
+    moment = 1.0 / _positive(characteristic_length, "the characteristic length L") ** 2
+    return np.array([1.0, 1.0, 1.0, moment, moment, moment])
 
 
 def _joint_inertia(stance: Stance) -> np.ndarray:
@@ -325,7 +329,8 @@ def _weight_matrix(
         need = "positive definite" if definite else "positive semidefinite"
         raise InvalidInputError(
             f"criterion {criterion!r}: {what} weights must be {need}; their smallest eigenvalue is "
-            f"{lowest:.3g}. Every direction needs a {'positive' if definite else 'non-negative'} cost."
+            f"{lowest:.3g}. Give every direction a "
+            f"{'positive' if definite else 'non-negative'} cost."
         )
     return matrix
 

@@ -53,8 +53,10 @@ class StaticEquilibrium:
 
     @property
     def wrenches(self) -> Float[np.ndarray, "nc 6"]:
-        """Wrench of the environment on the robot at each contact: force then moment about the
-        contact frame's origin, contact axes [N, Nm]."""
+        """Wrench of the environment on the robot at each contact [N, Nm].
+
+        Force, then moment about the contact frame's origin, in contact axes.
+        """
         return self.stance.unstack(self.forces)
 
     @property

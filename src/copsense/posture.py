@@ -243,7 +243,7 @@ def _what_remains(
     labels = [f"contact {row}" for row in stance.row_names]
     labels += [f"CoM {'xyz'[i]}" for i in axes] + [f"joint {joint}" for joint in joints]
     worst = int(np.argmax(np.abs(h)))
-    asked = ", ".join(f"CoM {'xyz'[i]} = {value:g} m" for i, value in wanted)
+    asked = ", ".join(f"CoM {'xyz'[i]} = {round(value, 6):g} m" for i, value in wanted)
     return (
         f"no posture of {stance.robot.name!r} with the contacts in place was found"
         + (f" for {asked}" if asked else "")

@@ -89,7 +89,7 @@ class Robot:
     def from_mjcf(
         cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
     ) -> Robot:
-        """Read an MJCF file or its text; see `from_urdf`. A base without joint gets a free-flyer."""
+        """Read an MJCF file or its text, as `from_urdf`; a base without joint gets a free-flyer."""
         description = _read_description(source, "mjcf", package_dirs)
         return cls.from_description(description, name=name)
 
@@ -257,7 +257,7 @@ def build_model(description: Description) -> pin.Model:
 
 
 class mjcf_file:  # noqa: N801 - a context manager, used like a function
-    """A path that holds an MJCF text: its own file, or a temporary one (the parser wants a path)."""
+    """A path that holds an MJCF text, which the parser wants: its own file or a temporary one."""
 
     def __init__(self, description: Description) -> None:
         """Remember what to write."""

@@ -18,6 +18,7 @@ from copsense.stance import Stance
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
+_STILL = 1e-12  # gains under which nothing moves
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 
 
@@ -93,8 +94,10 @@ class CopSensitivity:
 
     @cached_property
     def _inverse_root(self) -> Float[np.ndarray, "p r"]:
-        """R with R R' = (Z' M Z)^-1, leaving out motions of massless links alone: they have no
-        energy to be measured by, and move no centre of mass."""
+        """R with R R' = (Z' M Z)^-1, leaving out motions of massless links alone.
+
+        They have no energy to be measured by, and move no centre of mass.
+        """
         energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
         values, vectors = np.linalg.eigh(energy)
         kept = values > _MASSLESS * values[-1]
@@ -107,6 +110,26 @@ class CopSensitivity:
         Rows: CoP x, y in contact axes; columns: CoM x, y in world axes.
         """
         return self.gradient @ self.com_motions
+
+    @cached_property
+    def load_gain(self) -> Float[np.ndarray, "nc 2"]:
+        """Change of each contact's share of the weight, f_z / (m g), per CoM travel [1/m].
+
+        Columns: CoM x, y in world axes.
+        """
+        normal = self.wrench_derivative[:, 2] @ self.basis.T
+        return np.asarray(normal @ self.com_motions / self.equilibrium.stance.robot.weight)
+
+    @cached_property
+    def unloading_travel(self) -> Float[np.ndarray, " nc"]:
+        """How far the CoM may move before a contact carries no load, to first order [m].
+
+        Signed as the load, infinite where the load does not change.
+        """
+        share = self.equilibrium.wrenches[:, 2] / self.equilibrium.stance.robot.weight
+        speed = np.linalg.norm(self.load_gain, axis=1)
+        still = speed <= _STILL
+        return np.where(still, np.copysign(np.inf, share), share / np.where(still, 1.0, speed))
 
     @cached_property
     def worst_case_gain(self) -> Float[np.ndarray, " nc"]:
@@ -122,7 +145,7 @@ class CopSensitivity:
     def com_travel(self) -> Float[np.ndarray, " nc"]:
         """How far the CoM may move before a contact tips, to first order [m].
 
-        Least over the sole's edges of margin / |a' Gamma|, a the edge's normal: signed as the
+        Least over the sole's edges of ``margin / |a' Gamma|``, a the edge's normal: signed as the
         margin (negative where the CoP is off the sole already), infinite where the CoP does not
         move (a point contact, or a contact without a polygon).
         """
@@ -133,7 +156,7 @@ class CopSensitivity:
             normals, offsets = half_planes(contact.polygon)
             margins = offsets - normals @ self.cop[k]
             speeds = np.linalg.norm(normals @ self.com_gain[k], axis=1)
-            moving = speeds > 1e-12
+            moving = speeds > _STILL
             if np.any(moving):
                 travel[k] = np.min(margins[moving] / speeds[moving])
             if np.any(margins[~moving] < 0):
@@ -179,7 +202,9 @@ def finite_difference_sensitivity(
     Z = stance.admissible_motions
     wrenches, torques = [], []
     for z in Z.T:
-        at = {s: solve_equilibrium(retract(stance, s * step * z), criterion) for s in (-2, -1, 1, 2)}
+        at = {
+            s: solve_equilibrium(retract(stance, s * step * z), criterion) for s in (-2, -1, 1, 2)
+        }
         wrenches.append(
             (8 * (at[1].wrenches - at[-1].wrenches) - (at[2].wrenches - at[-2].wrenches))
             / (12 * step)

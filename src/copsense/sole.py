@@ -111,8 +111,8 @@ def _shape_vertices(shape: pin.GeometryObject, axes: pin.SE3) -> Float[np.ndarra
     if isinstance(geometry, coal.Sphere | coal.Capsule):
         # The lowest point of a ball lies straight under its centre.
         down = -(shape.placement.rotation.T @ axes.rotation[:, 2]) * geometry.radius
-        half = geometry.halfLength if isinstance(geometry, coal.Capsule) else 0.0
-        return np.array([[0.0, 0.0, half], [0.0, 0.0, -half]]) + down
+        end = geometry.halfLength if isinstance(geometry, coal.Capsule) else 0.0
+        return np.array([[0.0, 0.0, end], [0.0, 0.0, -end]]) + down
     if isinstance(geometry, coal.BVHModelBase):
         return np.array(geometry.vertices())
     if isinstance(geometry, coal.ConvexBase):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -103,14 +104,12 @@ class Stance:
     def rows(self) -> tuple[slice, ...]:
         """Rows of each contact in stacked forces."""
         ends = np.cumsum([0] + [len(contact.components) for contact in self.contacts])
-        return tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
     @cached_property
     def row_names(self) -> tuple[str, ...]:
         """Names of the rows of stacked forces, such as ``"l_sole fz"``."""
-        return tuple(
-            f"{c.name} {COMPONENT_NAMES[i]}" for c in self.contacts for i in c.components
-        )
+        return tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in self.contacts for i in c.components)
 
     @cached_property
     def component_index(self) -> np.ndarray:
@@ -305,7 +304,7 @@ def _check_support(stance: Stance) -> None:
     if rank < nb:
         kinds = ", ".join(f"{c.name} ({c.kind})" for c in stance.contacts)
         raise InsufficientContactsError(
-            f"the contacts of {stance.robot.name!r} ({kinds}) cannot balance every force and moment "
-            f"on its base: they span {rank} of {nb} directions. Use at least one surface contact, "
-            "or three point contacts that are not on one line."
+            f"the contacts of {stance.robot.name!r} ({kinds}) cannot balance every force and "
+            f"moment on its base: they span {rank} of {nb} directions. Use at least one surface "
+            "contact, or three point contacts that are not on one line."
         )

@@ -17,10 +17,10 @@ _SUFFIXES = (".nc", ".csv")
 
 
 def write_results(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a sweep as netCDF (``.nc``) or as a table (``.csv``, a row per posture, criterion
-    and contact).
+    """Write a sweep as netCDF (``.nc``) or as a table (``.csv``).
 
-    The file is written beside its place and renamed, so that it is whole or not there.
+    The table has a row per posture, criterion and contact; netCDF has everything. The file is
+    written beside its place and renamed, so that it is whole or not there.
 
     Raises:
         InvalidInputError: another suffix.
@@ -42,7 +42,9 @@ def load_results(path: str | Path) -> xr.Dataset:
     """
     path = Path(path)
     if not path.is_file():
-        raise InvalidInputError(f"no file at {path}. Write one with: copsense sweep ... --output FILE.nc")
+        raise InvalidInputError(
+            f"no file at {path}. Write one with: copsense sweep ... --output FILE.nc"
+        )
     try:
         with xr.open_dataset(path, engine="netcdf4") as opened:
             dataset = opened.load()
@@ -55,6 +57,24 @@ def load_results(path: str | Path) -> xr.Dataset:
         )
     dataset["pulling"] = dataset["pulling"].astype(bool)
     return dataset
+
+
+def load_configurations(path: str | Path) -> np.ndarray:
+    """Configurations (N, nq) from a ``.npy`` array or a ``.csv`` of numbers, a row each.
+
+    Raises:
+        InvalidInputError: no such file, or not a table of numbers.
+    """
+    path = Path(path)
+    try:
+        rows = np.load(path) if path.suffix == ".npy" else np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(
+            f"{path} is no table of configurations (.npy, or .csv with nq numbers a row): {error}"
+        ) from None
+    if rows.ndim != 2 or not len(rows):
+        raise InvalidInputError(f"{path} must hold rows of nq numbers; got shape {rows.shape}.")
+    return np.asarray(rows, dtype=float)
 
 
 def table(dataset: xr.Dataset) -> pd.DataFrame:
@@ -78,6 +98,7 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 "margin",
                 "margin_side",
                 "com_travel",
+                "unloading_travel",
                 "cop_gain",
                 "cop_slope",
                 "worst_case_gain",

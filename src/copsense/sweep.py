@@ -48,6 +48,11 @@ _PER_CRITERION: dict[str, tuple[tuple[str, ...], str, str]] = {
         "m",
         "first-order distance the centre of mass may move before the contact tips",
     ),
+    "unloading_travel": (
+        ("contact",),
+        "m",
+        "first-order distance the centre of mass may move before the contact carries no load",
+    ),
     "margin": (
         ("contact",),
         "m",
@@ -131,6 +136,7 @@ def _row(row: CopSensitivity, tangent: np.ndarray) -> dict[str, Any]:
         "cop_gain": row.com_gain,
         "worst_case_gain": row.worst_case_gain,
         "com_travel": row.com_travel,
+        "unloading_travel": row.unloading_travel,
         "residual": row.equilibrium.residual(),
     }
 
@@ -173,7 +179,11 @@ def _dataset(
         for name, (dims, unit, meaning) in _PER_CRITERION.items()
     }
     data["margin_side"] = ((*first, "contact"), side.astype(str), {"long_name": "side of the edge"})
-    data["pulling"] = ((*first, "contact"), pulling, {"long_name": "the contact would have to pull"})
+    data["pulling"] = (
+        (*first, "contact"),
+        pulling,
+        {"long_name": "the contact would have to pull"},
+    )
     data["reason"] = (first, reason.astype(str), {"long_name": "why the row failed; empty if not"})
     coms = np.array([s.com for s in path.stances])
     for i in path.failures:

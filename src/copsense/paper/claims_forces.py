@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from copsense.paper.claim import CheckedClaim, Claim, Finding, judge
-from copsense.paper.comparison import EXACT, angle_at
+from copsense.paper.comparison import EXACT, angle_at, with_kappa
 from copsense.paper.errata_statements import pole
 from copsense.paper.four_bar import FourBar
 from copsense.paper.travel import (
@@ -96,7 +96,10 @@ def _tends_to_zero(four_bar: FourBar) -> Finding:
 
 def _diverges_at_14(four_bar: FourBar) -> Finding:
     angle = math.degrees(pole(four_bar))
-    lever = math.degrees(math.pi / 2 - angle_at(four_bar, four_bar.rod_length / 2))
+    over = [
+        math.degrees(math.pi / 2 - angle_at(linkage, linkage.rod_length / 2))
+        for linkage in (four_bar, with_kappa(four_bar, 0.6))
+    ]
     needed = four_bar.kappa * math.sin(math.radians(14.0))
     return Finding(
         judge(abs(angle - 14.0) < _DEGREE),
@@ -104,8 +107,8 @@ def _diverges_at_14(four_bar: FourBar) -> Finding:
         "deg",
         f"Delta xi at which a foot unloads under criterion 2 (claimed 14, tolerance {_DEGREE}); "
         f"14 deg needs d/l = {needed:.3f}, and d/l is "
-        f"{four_bar.rod_length / four_bar.leg_length:.3f}. The CoM is over a foot at {lever:.1f} "
-        "deg",
+        f"{four_bar.rod_length / four_bar.leg_length:.3f}. The CoM is over a foot at "
+        f"{over[0]:.1f} deg ({over[1]:.1f} deg for kappa = 3/5)",
     )
 
 

@@ -50,8 +50,10 @@ def _one_hand(four_bar: FourBar) -> Finding:
     """Whether some one hand suits Eqs. (15), (16) and (17), each at the kappa of its numbers."""
     least = min(
         max(
-            form_difference(at_printed_kappa(four_bar, equation), equation, *rest, hand)
-            for equation, *rest in (
+            form_difference(
+                at_printed_kappa(four_bar, equation), equation, criterion, quantity, hand
+            )
+            for equation, criterion, quantity in (
                 ("(15)", "minimum-wrench", "wrenches"),
                 ("(16)", "minimum-wrench", "sensitivity"),
                 ("(17)", "minimum-torque", "wrenches"),

@@ -20,14 +20,19 @@ def _rank(matrix: np.ndarray) -> int:
 def _one_freedom(four_bar: FourBar) -> Finding:
     linkage = Linkage(four_bar)
     free = {7 - _rank(linkage.jacobian(xi)) for xi in sampled_angles(four_bar)}
-    return Finding(judge(free == {1}), max(free), "1", "dimension of the null space of J (6 x 7)")
+    return Finding(
+        judge(free == {1}), float(max(free)), "1", "dimension of the null space of J (6 x 7)"
+    )
 
 
 def _redundancy(four_bar: FourBar) -> Finding:
     linkage = Linkage(four_bar)
     free = {6 - _rank(wrench_balance(linkage.com_to_feet(xi))) for xi in sampled_angles(four_bar)}
     return Finding(
-        judge(free == {3}), max(free), "1", "wrench components that X f = m g e2 leaves free of 6"
+        judge(free == {3}),
+        float(max(free)),
+        "1",
+        "wrench components that X f = m g e2 leaves free of 6",
     )
 
 
@@ -37,7 +42,7 @@ def _full_row_rank(four_bar: FourBar) -> Finding:
     flat = _rank(linkage.jacobian(0.0))
     return Finding(
         judge(standing == 6 and flat == 6, standing == 6),
-        flat,
+        float(flat),
         "1",
         f"rank of J at sin(xi) = 0; between the feet {standing} of 6. Condition: sin(xi) != 0",
     )
@@ -101,12 +106,11 @@ def _chart(four_bar: FourBar) -> Finding:
 
 
 def _metric(four_bar: FourBar) -> Finding:
-    gains = [
-        solve_four_bar(four_bar, np.pi / 2, "minimum-wrench", characteristic_length=L).cop_per_com[
-            0
-        ]
+    solutions = (
+        solve_four_bar(four_bar, np.pi / 2, "minimum-wrench", characteristic_length=L)
         for L in (1.0, four_bar.rod_length / 2)
-    ]
+    )
+    gains = [found.cop_per_com[0] for found in solutions]
     spread = gains[0] / gains[1]
     return Finding(
         judge(abs(spread - 1.0) > 0.1),

@@ -79,8 +79,10 @@ def handedness(four_bar: FourBar) -> Discrepancy:
 
     def differences(hand: Hand) -> list[float]:
         numbers = [
-            form_difference(at_printed_kappa(four_bar, equation), equation, *rest, hand)
-            for equation, *rest in (
+            form_difference(
+                at_printed_kappa(four_bar, equation), equation, criterion, quantity, hand
+            )
+            for equation, criterion, quantity in (
                 ("(16)", "minimum-wrench", "sensitivity"),
                 ("(17)", "minimum-torque", "wrenches"),
                 ("(31)", "minimum-torque", "wrenches"),

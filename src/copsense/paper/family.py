@@ -105,6 +105,7 @@ def leg_angle(xi: object) -> float:
     return angle
 
 
+@np.errstate(over="ignore", invalid="ignore")  # FourBarSolution refuses what overflows
 def solve_four_bar_member(
     four_bar: FourBar, xi: float, share: float, horizontal_force: float = 0.0
 ) -> FourBarSolution:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from copsense.errors import InvalidInputError, UnloadedContactError
+from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.paper.criteria import solve_four_bar
 from copsense.paper.family import FourBarSolution
 from copsense.paper.four_bar import FourBar, positive_number
@@ -76,13 +76,14 @@ class FigureData:
         """The curve of that label.
 
         Raises:
-            InvalidInputError: there is none.
+            UnknownNameError: there is none.
         """
         for curve in self.curves:
             if curve.label == label:
                 return curve
-        labels = ", ".join(repr(curve.label) for curve in self.curves)
-        raise InvalidInputError(f"figure {self.name} has no curve {label!r}. Valid: {labels}.")
+        raise UnknownNameError(
+            f"curve of figure {self.name}", label, (c.label for c in self.curves)
+        )
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float, Inexact
 
 from copsense.paper.four_bar import FourBar
 
@@ -49,13 +49,13 @@ class Linkage:
             [d / 2 + l * np.cos(xi), l * np.sin(xi), 0.0, xi, np.pi - xi, xi, np.pi - xi]
         )
 
-    def feet(self, q: Complex[np.ndarray, "7"]) -> Complex[np.ndarray, "6"]:
+    def feet(self, q: Inexact[np.ndarray, "7"]) -> Inexact[np.ndarray, "6"]:
         """Poses (x, y, angle) of the left and of the right foot [m, rad]."""
         points = self._points(q)
         angles = q[2] + np.array([q[3] + q[4], q[5] + q[6]])
         return np.concatenate([points[0], angles[:1], points[1], angles[1:]])
 
-    def masses(self, q: Complex[np.ndarray, "7"]) -> Complex[np.ndarray, "6"]:
+    def masses(self, q: Inexact[np.ndarray, "7"]) -> Inexact[np.ndarray, "6"]:
         """Positions (x, y) of the point masses: left leg, right leg, rod [m] (Hypothesis 1-i)."""
         hips, feet = self._hips(q), self._points(q)
         return np.concatenate([(hips[0] + feet[0]) / 2, (hips[1] + feet[1]) / 2, q[:2]])
@@ -81,19 +81,19 @@ class Linkage:
         feet = self.feet(self.standing(xi)).real
         return np.array([feet[0:2], feet[3:5]]) - self.four_bar.com(xi)
 
-    def _hips(self, q: Complex[np.ndarray, "7"]) -> Complex[np.ndarray, "2 2"]:
+    def _hips(self, q: Inexact[np.ndarray, "7"]) -> Inexact[np.ndarray, "2 2"]:
         side = self.hand.value * self.four_bar.rod_length / 2
         along = np.array([np.cos(q[2]), np.sin(q[2])])
         return np.array([q[:2] + side * along, q[:2] - side * along])
 
-    def _points(self, q: Complex[np.ndarray, "7"]) -> Complex[np.ndarray, "2 2"]:
+    def _points(self, q: Inexact[np.ndarray, "7"]) -> Inexact[np.ndarray, "2 2"]:
         angles = q[2] + q[[3, 5]]
         legs = self.four_bar.leg_length * np.column_stack([np.cos(angles), np.sin(angles)])
         return np.asarray(self._hips(q) - legs)
 
 
 def _derivative(
-    function: Callable[[Complex[np.ndarray, "n"]], Complex[np.ndarray, "m"]],
+    function: Callable[[Inexact[np.ndarray, "n"]], Inexact[np.ndarray, "m"]],
     q: Float[np.ndarray, "n"],
 ) -> Float[np.ndarray, "m n"]:
     """Derivative d function / dq by the complex step, exact to rounding."""

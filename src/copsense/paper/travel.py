@@ -1,7 +1,7 @@
 """The two criteria along the CoM's travel between the feet, for the claims about them.
 
 The paper means L = 1 m in criterion 1 and never says so. Where a claim rests on that, its check
-asks again with an L below d/2, where the two criteria have changed places: the condition is d < 2 L.
+asks again with a shorter one; below d/2 the two criteria have changed places.
 """
 
 from __future__ import annotations

@@ -44,18 +44,14 @@ def four_bar_robot(
     model.name = "four_bar"
     # The planar joint's x, y, rotation become the world's y, z, rotation about x.
     plane = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    base = model.addJoint(
-        0, pin.JointModelPlanar(), pin.SE3(plane, np.zeros(3)), "root_joint"
-    )
+    base = model.addJoint(0, pin.JointModelPlanar(), pin.SE3(plane, np.zeros(3)), "root_joint")
     _point_mass(model, base, body_mass, np.zeros(3))
     for side, sign in (("l", 1.0), ("r", -1.0)):
         at_hip = pin.SE3(np.eye(3), np.array([sign * rod_length / 2, 0.0, 0.0]))
         hip = model.addJoint(base, pin.JointModelRZ(), at_hip, f"{side}_hip")
         down = np.array([0.0, -leg_length, 0.0])
         _point_mass(model, hip, leg_mass, down / 2)
-        ankle = model.addJoint(
-            hip, pin.JointModelRZ(), pin.SE3(np.eye(3), down), f"{side}_ankle"
-        )
+        ankle = model.addJoint(hip, pin.JointModelRZ(), pin.SE3(np.eye(3), down), f"{side}_ankle")
         sole = pin.SE3(plane.T, np.zeros(3))
         model.addFrame(pin.Frame(f"{side}_sole", ankle, 0, sole, pin.FrameType.OP_FRAME))
     return Robot.from_model(model, name="four_bar")

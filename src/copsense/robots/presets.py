@@ -183,7 +183,9 @@ _LISTED = (
         "PAL Robotics Talos, half sitting",
         partial(_example, "talos_data/robots/talos_reduced.urdf", "talos", ("gripper", "head")),
         (Contact("left_sole_link"), Contact("right_sole_link")),
-        _sides({"leg_*_3_joint": -23.6, "leg_*_4_joint": 49.2, "leg_*_5_joint": -25.7}, "left", "right")
+        _sides(
+            {"leg_*_3_joint": -23.6, "leg_*_4_joint": 49.2, "leg_*_5_joint": -25.7}, "left", "right"
+        )
         | _sides(
             {"arm_*_1_joint": 14.8, "arm_*_2_joint": 9.9, "arm_*_4_joint": -30.1},
             "left",
@@ -230,9 +232,20 @@ _LISTED = (
         "human",
         "a human model of 74.7 kg with the proportions of an adult",
         partial(_example, "human_description/robots/human.urdf", "human"),
-        (_HUMAN_FOOT, Contact("right_foot", rotation=_HUMAN_FOOT.rotation,
-                              offset=_HUMAN_FOOT.offset, polygon=_HUMAN_FOOT.polygon)),
-        _sides({"*_hip_Z": 15.0, "*_knee_Z": 30.0, "*_ankle_Z": 15.0, "*_elbow_Z": 10.0}, "left", "right"),
+        (
+            _HUMAN_FOOT,
+            Contact(
+                "right_foot",
+                rotation=_HUMAN_FOOT.rotation,
+                offset=_HUMAN_FOOT.offset,
+                polygon=_HUMAN_FOOT.polygon,
+            ),
+        ),
+        _sides(
+            {"*_hip_Z": 15.0, "*_knee_Z": 30.0, "*_ankle_Z": 15.0, "*_elbow_Z": 10.0},
+            "left",
+            "right",
+        ),
         base_rpy=(90.0, 0.0, 0.0),
         sole_from_geometry=None,
     ),
@@ -277,4 +290,6 @@ def preset_robot(preset: Preset) -> Robot:
     try:
         return preset.load()
     except FileNotFoundError as error:
-        raise ModelLoadError(f"robot {preset.name!r} is not in the installed package: {error}") from None
+        raise ModelLoadError(
+            f"robot {preset.name!r} is not in the installed package: {error}"
+        ) from None

@@ -28,9 +28,7 @@ class ContactGeometryWarning(UserWarning):
     """A contact frame is not on the sole that the collision geometry shows."""
 
 
-def load_robot(
-    source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()
-) -> Robot:
+def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
     Raises:
@@ -48,9 +46,7 @@ def load_robot(
         return read(text, package_dirs=package_dirs)
     path = Path(source)
     if not path.is_file() and not path.suffix and path.parent == Path():
-        raise UnknownNameError(
-            "robot", text, PRESETS, "Or give the path of a URDF or MJCF file."
-        )
+        raise UnknownNameError("robot", text, PRESETS, "Or give the path of a URDF or MJCF file.")
     if path.is_file() and "<mujoco" in path.read_text(encoding="utf-8", errors="replace"):
         return Robot.from_mjcf(path, package_dirs=package_dirs)
     return Robot.from_urdf(path, package_dirs=package_dirs)
@@ -77,8 +73,8 @@ def load_stance(
         width: lateral distance between two feet [m].
         contact_at: ``"sole"`` puts each surface contact at the bottom of its collision geometry
             and reads its polygon; ``"frame"`` keeps it at the model's frame and reads the polygon
-            if it can. Default: as the preset says; ``"sole"`` where a robot of the user's own has
-            collision geometry and the contact has no polygon.
+            if it can. Default: as the preset says; for another robot ``"frame"``, with a warning
+            where that is not on the sole.
         package_dirs: folders that hold the packages of ``package://`` meshes.
 
     Raises:
@@ -103,7 +99,11 @@ def load_stance(
     chosen = _complete(robot, chosen, preset, contact_at)
     angles = {j: float(np.radians(a)) for j, a in preset.posture.items()} if preset else {}
     q = robot.configuration(angles | dict(posture or {}))
-    rpy = np.radians(preset.base_rpy) if preset and base_rpy is None else np.array(base_rpy or (0, 0, 0))
+    rpy = (
+        np.radians(preset.base_rpy)
+        if preset and base_rpy is None
+        else np.array(base_rpy or (0, 0, 0))
+    )
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
     return stand(robot, chosen, q, width=width if width is not None or not preset else preset.width)
 
@@ -135,7 +135,9 @@ def stand(
         base = pin.Quaternion(loose.q[3:7]).matrix()
         loose = loose.at(_turn_base(robot, loose.q, flat @ base), check=False)
     middle = np.mean([place.translation for place in loose.placements], axis=0)
-    heights = [_height(c, p.translation - middle) for c, p in zip(contacts, loose.placements, strict=True)]
+    heights = [
+        _height(c, p.translation - middle) for c, p in zip(contacts, loose.placements, strict=True)
+    ]
     loose = loose.at(_shift_base(robot, loose.q, -middle - [0, 0, np.mean(heights)]), check=False)
     targets = []
     for k, (contact, place) in enumerate(zip(contacts, loose.placements, strict=True)):
@@ -192,7 +194,11 @@ def _complete(
     completed = []
     for contact in contacts:
         needs = contact.kind == "surface" and (contact.polygon is None or at is not None)
-        if not needs or (preset and mode is None) or (not preset and robot.description is None and not at):
+        if (
+            not needs
+            or (preset and mode is None)
+            or (not preset and robot.description is None and not at)
+        ):
             completed.append(contact)
             continue
         robot.frame(contact.frame)
@@ -209,21 +215,20 @@ def _complete(
             )
             completed.append(contact)
             continue
-        offset = np.array(contact.offset)
+        offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if mode == "sole":
-            up = contact.rotation[:, 2]
             offset = offset + up * (sole.height - up @ offset)
-        elif not preset and abs(sole.height - contact.rotation[:, 2] @ offset) > _OFF_SOLE:
+        elif not preset and abs(sole.height - up @ offset) > _OFF_SOLE:
             warnings.warn(
-                f"frame {contact.frame!r} is {abs(sole.height) * 1e3:.1f} mm from the bottom of "
-                "its collision geometry. Give contact_at='sole' to put the contact there, or "
+                f"contact {contact.name!r} is {abs(sole.height - up @ offset) * 1e3:.1f} mm from the "
+                "bottom of its collision geometry. Give contact_at='sole' to put the contact there, or "
                 "contact_at='frame' to keep it.",
                 ContactGeometryWarning,
                 stacklevel=3,
             )
-        completed.append(
-            replace(contact, offset=tuple(float(c) for c in offset), polygon=sole.polygon)
-        )
+        x, y, z = (float(c) for c in offset)
+        polygon = sole.polygon if contact.polygon is None else contact.polygon
+        completed.append(replace(contact, offset=(x, y, z), polygon=polygon))
     return tuple(completed)
 
 

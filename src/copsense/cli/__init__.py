@@ -1,0 +1,61 @@
+"""The command line: arguments in, results out, exit code 0 done, 1 some rows failed, 2 bad usage.
+
+Commands import what they need when they run, so that help is immediate.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Any
+
+import click
+
+from copsense._version import __version__
+from copsense.cli.analyse import analyse
+from copsense.cli.four_bar import four_bar
+from copsense.cli.reproduce import reproduce
+from copsense.cli.robots import robots
+from copsense.cli.sweep import plot, sweep
+from copsense.errors import CopsenseError
+
+
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit codes: 0 done, 1 some rows failed, 2 bad usage or input. "
+    "Each command's --help shows an example.",
+)
+@click.version_option(__version__, prog_name="copsense")
+def copsense() -> None:
+    """How fast does the centre of pressure under each foot move when the posture does?
+
+    Static centre-of-pressure sensitivity of legged robots, after Romano et al., arXiv:1610.01495.
+    """
+
+
+for _command in (robots, four_bar, analyse, sweep, plot, reproduce):
+    copsense.add_command(_command)
+
+
+def main() -> None:
+    """Run the command line; an error of copsense is a line, not a traceback."""
+    warnings.showwarning = _show_warning
+    try:
+        sys.exit(copsense.main(standalone_mode=False) or 0)
+    except CopsenseError as error:
+        click.echo(f"error: {error}", err=True)
+    except click.UsageError as error:
+        error.show()
+    except click.ClickException as error:
+        error.show()
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("stopped; nothing half-written is left behind.", err=True)
+        sys.exit(130)
+    except BrokenPipeError:
+        sys.stderr.close()  # whoever read our output has seen enough
+        sys.exit(0)
+    sys.exit(2)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    click.echo(f"note: {message}", err=True)

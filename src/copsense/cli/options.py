@@ -1,0 +1,177 @@
+"""Options that several commands share, and how their values are read."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+from tqdm import tqdm
+
+from copsense.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.criterion import Criterion
+    from copsense.stance import Stance
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def stance_options(command: F) -> F:
+    """The robot and how it stands."""
+    options = [
+        click.argument("robot"),
+        click.option(
+            "--contact",
+            "contacts",
+            multiple=True,
+            metavar="FRAME[:KIND]",
+            help="Contact frame; KIND is surface (default) or point. Repeatable; a preset "
+            "has its own.",
+        ),
+        click.option(
+            "--contact-at",
+            type=click.Choice(["frame", "sole"]),
+            help="Put surface contacts at the model's frame, or at the sole's bottom as the "
+            "collision geometry shows it.",
+        ),
+        click.option(
+            "--package-dir",
+            "package_dirs",
+            multiple=True,
+            type=click.Path(file_okay=False),
+            help="Folder in which package:// meshes are looked up. Repeatable.",
+        ),
+        click.option(
+            "--posture",
+            multiple=True,
+            metavar="JOINT=DEG",
+            help="Joint position that the posture stays nearest to [deg]. Repeatable.",
+        ),
+        click.option(
+            "--base-yaw",
+            type=float,
+            metavar="DEG",
+            help="Heading of the base [deg], so that the robot faces +x; a preset has its own.",
+        ),
+        click.option("--width", type=float, metavar="M", help="Distance between two feet [m]."),
+        click.option(
+            "--criterion",
+            "criteria",
+            multiple=True,
+            metavar="NAME",
+            help="How the load is shared: minimum-wrench, minimum-torque, limit-weighted-torque, "
+            "inertia-weighted-torque or minimum-tangential. Repeatable; default the first two.",
+        ),
+        click.option(
+            "--characteristic-length",
+            type=float,
+            default=1.0,
+            show_default=True,
+            metavar="M",
+            help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
+        ),
+    ]
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def read_stance(
+    robot: str,
+    contacts: tuple[str, ...],
+    contact_at: Any,
+    package_dirs: tuple[str, ...],
+    posture: tuple[str, ...],
+    base_yaw: float | None,
+    width: float | None,
+) -> Stance:
+    """The stance that the options of `stance_options` describe."""
+    from copsense.robots import PRESETS, load_robot, load_stance
+
+    # A preset is passed by name, so that its feet and posture come along.
+    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    angles = {joint: math.radians(deg) for joint, deg in read_assignments(posture).items()}
+    return load_stance(
+        source,
+        contacts=[read_contact(c) for c in contacts] or None,
+        contact_at=contact_at,
+        package_dirs=package_dirs,
+        posture=angles,
+        base_rpy=None if base_yaw is None else (0.0, 0.0, math.radians(base_yaw)),
+        width=width,
+    )
+
+
+def read_contact(text: str) -> Any:
+    """``FRAME`` as the frame's name, ``FRAME:KIND`` as a contact."""
+    from copsense.contact import COMPONENTS, Contact
+
+    frame, colon, kind = text.partition(":")
+    if not colon:
+        return frame
+    if kind not in COMPONENTS:
+        raise UnknownNameError("kind of contact", kind, COMPONENTS)
+    return Contact(frame, kind=kind)  # type: ignore[arg-type]
+
+
+def read_assignments(texts: tuple[str, ...]) -> dict[str, float]:
+    """``NAME=NUMBER`` options as a dictionary."""
+    values = {}
+    for text in texts:
+        name, equals, number = text.partition("=")
+        try:
+            values[name] = float(number)
+        except ValueError:
+            equals = ""
+        if not (name and equals):
+            raise InvalidInputError(
+                f"{text!r} is not of the form JOINT=DEGREES, such as l_knee=-20."
+            )
+    return values
+
+
+def read_range(text: str) -> tuple[float, float, int]:
+    """``START:STOP:COUNT`` as numbers."""
+    try:
+        start, stop, count = text.split(":")
+        return float(start), float(stop), int(count)
+    except ValueError:
+        raise InvalidInputError(
+            f"{text!r} is not of the form START:STOP:COUNT, such as -0.07:0.07:201."
+        ) from None
+
+
+def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
+    """The criteria named, or the paper's two."""
+    from copsense.criterion import criterion_named
+
+    chosen = dict.fromkeys(names or ("minimum-wrench", "minimum-torque"))
+    return [criterion_named(name, characteristic_length) for name in chosen]
+
+
+@contextmanager
+def progress_bar(total: int, what: str) -> Iterator[Callable[[int], object]]:
+    """A bar with rate and time left on standard error, where somebody is there to see it."""
+    with tqdm(total=total, desc=what, unit="posture", disable=None, leave=False) as bar:
+        yield bar.update
+
+
+def echo_json(value: Mapping[str, Any]) -> None:
+    """Print JSON; infinities, which JSON lacks, become null."""
+    click.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _finite(v) for k, v in value.items()}
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

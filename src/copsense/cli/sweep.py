@@ -1,0 +1,193 @@
+"""``copsense sweep`` and ``copsense plot``: many postures, and their picture."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.options import (
+    echo_json,
+    progress_bar,
+    read_criteria,
+    read_range,
+    read_stance,
+    stance_options,
+)
+from copsense.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from copsense.motion import Path as MotionPath
+    from copsense.stance import Stance
+
+
+@click.command(
+    epilog="Example: copsense sweep icub --com-y -0.07:0.07:201 --criterion minimum-wrench "
+    "--criterion minimum-torque --output icub.nc"
+)
+@stance_options
+@click.option(
+    "--com-y",
+    metavar="START:STOP:COUNT",
+    help="Sweep the CoM sideways, world y [m]; CoM x held over the contacts' middle.",
+)
+@click.option("--joint", metavar="NAME=START:STOP:COUNT", help="Sweep a joint [deg].")
+@click.option(
+    "--configurations",
+    type=click.Path(),
+    metavar="FILE",
+    help="Evaluate these: a row (nq numbers) per posture, .csv or .npy; the first fixes the feet.",
+)
+@click.option(
+    "--output",
+    type=click.Path(),
+    help="Write netCDF (.nc, everything) or a table (.csv); print a summary alone if not given.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the output.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def sweep(
+    robot: str,
+    criteria: tuple[str, ...],
+    characteristic_length: float,
+    com_y: str | None,
+    joint: str | None,
+    configurations: str | None,
+    output: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Sweep the CoM or a joint of ROBOT, contacts in place, and evaluate every posture.
+
+    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. A posture that fails is
+    a row with its reason, and makes the exit code 1.
+    """
+    from copsense.storage import check_output, write_results
+    from copsense.sweep import failed_rows
+    from copsense.sweep import sweep as evaluate
+
+    if sum(what is not None for what in (com_y, joint, configurations)) != 1:
+        raise InvalidInputError(
+            "say what to sweep, one of: --com-y START:STOP:COUNT [m], "
+            "--joint NAME=START:STOP:COUNT [deg], --configurations FILE."
+        )
+    if output:
+        check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
+    chosen = read_criteria(criteria, characteristic_length)
+    path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
+    with progress_bar(len(path), "criteria") as update:
+        dataset = evaluate(path, chosen, progress=update)
+    dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
+    failures = failed_rows(dataset)
+    if output:
+        write_results(dataset, output, overwrite=force)
+    summary = _summary(dataset, output, failures)
+    if as_json:
+        echo_json(summary)
+    else:
+        _print(summary)
+    for posture, criterion, reason in failures[:5]:
+        click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
+    if len(failures) > 5:
+        click.echo(f"failed: {len(failures) - 5} more; see the variable 'reason'", err=True)
+    click.get_current_context().exit(1 if failures else 0)
+
+
+@click.command(epilog="Example: copsense plot icub.nc --output icub.png")
+@click.argument("file", type=click.Path())
+@click.option(
+    "--output",
+    type=click.Path(),
+    help="Picture to write: .png, .svg or .pdf. Default: FILE with .png.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the output.")
+def plot(file: str, output: str | None, force: bool) -> None:
+    """Draw a sweep written by `copsense sweep`: soles and CoPs, margins, load, CoM travel."""
+    from copsense.plots import plot_results, save_figure
+    from copsense.storage import check_output, load_results
+
+    path = Path(output) if output else Path(file).with_suffix(".png")
+    dataset = load_results(file)
+    check_output(path, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    save_figure(plot_results(dataset), path, overwrite=force)
+    click.echo(str(path))
+
+
+def _read_path(
+    stance: Stance, com_y: str | None, joint: str | None, configurations: str | None
+) -> MotionPath:
+    """The path that the options ask for."""
+    from copsense.motion import joint_sweep, lateral_sweep, path_through
+    from copsense.storage import load_configurations
+
+    if configurations is not None:
+        rows = load_configurations(configurations)
+        return path_through(stance.at(rows[0]), rows)
+    name, _, text = ("", "", com_y) if com_y is not None else str(joint).partition("=")
+    start, stop, count = read_range(text)
+    with progress_bar(max(count, 0), "postures") as update:
+        if com_y is not None:
+            return lateral_sweep(stance, start, stop, count, progress=update)
+        ends = math.radians(start), math.radians(stop)
+        return joint_sweep(stance, name, *ends, count, progress=update)
+
+
+def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str, Any]:
+    """What a person wants to know first: over which range every foot stays planted."""
+    coordinate = dataset.attrs["coordinate"]
+    values = dataset[coordinate].values
+    degrees = dataset[coordinate].attrs["units"] == "rad"
+    criteria = {}
+    for name in dataset["criterion"].values:
+        here = dataset.sel(criterion=name)
+        planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
+        run = _longest_run(planted)
+        criteria[str(name)] = {
+            "planted": sorted(float(values[i]) for i in run) if run else None,
+            "smallest_margin": float(here["margin"].min()),
+            "largest_residual": float(here["residual"].max()),
+        }
+    return {
+        "robot": dataset.attrs["robot"],
+        "coordinate": coordinate,
+        "unit": "rad" if degrees else dataset[coordinate].attrs["units"],
+        "postures": len(values),
+        "failed_rows": len(failures),
+        "output": output,
+        "criteria": criteria,
+    }
+
+
+def _longest_run(flags: Any) -> tuple[int, int] | None:
+    """First and last index of the longest run of true values."""
+    best, start = None, None
+    for i, flag in enumerate([*flags, False]):
+        if flag and start is None:
+            start = i
+        elif not flag and start is not None:
+            if best is None or i - 1 - start > best[1] - best[0]:
+                best = (start, i - 1)
+            start = None
+    return best
+
+
+def _print(summary: dict[str, Any]) -> None:
+    unit, factor = summary["unit"], 1.0
+    if unit == "rad":
+        unit, factor = "deg", 180.0 / math.pi
+    click.echo(f"{summary['robot']}: {summary['postures']} postures along {summary['coordinate']}")
+    for name, row in summary["criteria"].items():
+        if row["planted"] is None:
+            planted = "no posture keeps every contact planted"
+        else:
+            low, high = (value * factor for value in row["planted"])
+            planted = f"every contact planted from {low:+.4g} to {high:+.4g} {unit}"
+        if math.isfinite(row["smallest_margin"]):
+            planted += f"; smallest margin on the way {row['smallest_margin'] * 1e3:+.1f} mm"
+        click.echo(f"  {name}: {planted}")
+    if summary["output"]:
+        click.echo(f"written: {summary['output']}")
