@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+_LISTED = 40  # names that an error lists at most
+
 
 class CopsenseError(Exception):
     """Base of every error that copsense raises on purpose."""
@@ -29,7 +31,12 @@ class UnknownNameError(CopsenseError, KeyError):
         lowered = {choice.lower(): choice for choice in self.valid}
         near = difflib.get_close_matches(self.name.lower(), lowered, n=3, cutoff=0.5)
         hint = f" Did you mean {' or '.join(lowered[n] for n in near)}?" if near else ""
-        listed = ", ".join(self.valid) if self.valid else "none"
+        listed = ", ".join(self.valid[:_LISTED]) if self.valid else "none"
+        if len(self.valid) > _LISTED:
+            # Hundreds of frames would bury the message: the likeliest stand first.
+            alike = difflib.get_close_matches(self.name.lower(), lowered, n=_LISTED, cutoff=0.3)
+            some = [lowered[n] for n in alike] or list(self.valid[:_LISTED])
+            listed = f"{', '.join(some)} ... ({len(self.valid)} in all)"
         self.message = f"no {kind} named {self.name!r}.{hint} Valid: {listed}." + (
             f" {remedy}" if remedy else ""
         )

@@ -153,6 +153,23 @@ class Stance:
         return pin.crba(model, model.createData(), self.q, pin.Convention.WORLD)
 
     @cached_property
+    def joint_limit_excess(self) -> Float[np.ndarray, " n"]:
+        """How far each joint stands beyond the model's limits, zero within them [rad, m].
+
+        Nothing here keeps a posture within them: this says where one is not.
+        """
+        model, excess = self.robot.model, np.zeros(len(self.robot.torque_names))
+        for joint in list(model.joints)[2:]:
+            if joint.nq == 1:  # others have no limits to exceed
+                low, high = (
+                    model.lowerPositionLimit[joint.idx_q],
+                    model.upperPositionLimit[joint.idx_q],
+                )
+                beyond = max(low - self.q[joint.idx_q], self.q[joint.idx_q] - high, 0.0)
+                excess[joint.idx_v - self.robot.base_nv] = beyond if low < high else 0.0
+        return excess
+
+    @cached_property
     def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         u, s, vt = np.linalg.svd(self.jacobian, full_matrices=True)
         return u, s, vt

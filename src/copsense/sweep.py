@@ -203,6 +203,11 @@ def _dataset(
         path.tangents,
         {"long_name": f"d configuration / d {path.coordinate}, base in its own frame"},
     )
+    data["joint_limit_excess"] = (
+        ("posture", "joint"),
+        np.array([s.joint_limit_excess for s in path.stances]),
+        {"units": "rad, m", "long_name": "how far the joint is beyond the model's limits"},
+    )
     places = stance.placements
     data["contact_position"] = (
         ("contact", "com_axis"),

@@ -80,6 +80,13 @@ def analyse(
             check_sensitivity(stance, criterion)
     answer = _answer(stance, results, tangent, along)
     answer["notes"] = list(sole_notes(stance))
+    answer["notes"] += [
+        f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
+        for joint, excess in zip(
+            stance.robot.torque_names, stance.joint_limit_excess.tolist(), strict=True
+        )
+        if excess > 1e-6
+    ]
     answer["checked"] = check
     if picture:
         from copsense.plots import plot_stance, save_figure
@@ -193,6 +200,17 @@ def _verdict(answer: dict[str, Any]) -> str:
         )
         for name, row in answer["criteria"].items()
     }
+    blind = [
+        c["name"]
+        for c in answer["contacts"]
+        if c["kind"] != "point"
+        and any("margin" not in row["contacts"][c["name"]] for row in answer["criteria"].values())
+    ]
+    if blind:
+        return (
+            f"No sole is known under {', '.join(blind)}, so when it tips is not either: give "
+            "--sole X0:X1:Y0:Y1."
+        )
     best = max(reach, key=lambda name: reach[name][0])
     distance, event = reach[best]
     if distance < 0:

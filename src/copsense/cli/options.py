@@ -14,6 +14,7 @@ from tqdm import tqdm
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
+    from copsense.contact import Contact
     from copsense.criterion import Criterion
     from copsense.stance import Stance
 
@@ -37,6 +38,18 @@ def stance_options(command: F) -> F:
             type=click.Choice(["frame", "sole"]),
             help="Put surface contacts at the model's frame, or at the sole's bottom as the "
             "collision geometry shows it.",
+        ),
+        click.option(
+            "--sole",
+            metavar="X0:X1:Y0:Y1",
+            help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
+            "the collision geometry's.",
+        ),
+        click.option(
+            "--sole-height",
+            type=float,
+            metavar="M",
+            help="Height of the contact plane over the model's frames, along their z [m].",
         ),
         click.option(
             "--package-dir",
@@ -84,6 +97,8 @@ def read_stance(
     robot: str,
     contacts: tuple[str, ...],
     contact_at: Any,
+    sole: str | None,
+    sole_height: float | None,
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
@@ -97,7 +112,7 @@ def read_stance(
     angles = {joint: math.radians(deg) for joint, deg in read_assignments(posture).items()}
     return load_stance(
         source,
-        contacts=[read_contact(c) for c in contacts] or None,
+        contacts=_read_contacts(robot, contacts, sole, sole_height),
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=angles,
@@ -106,16 +121,44 @@ def read_stance(
     )
 
 
-def read_contact(text: str) -> Any:
-    """``FRAME`` as the frame's name, ``FRAME:KIND`` as a contact."""
-    from copsense.contact import COMPONENTS, Contact
+def _read_contacts(
+    robot: str, texts: tuple[str, ...], sole: str | None, sole_height: float | None
+) -> list[str | Contact] | None:
+    """``FRAME[:KIND]`` options as contacts; a frame alone takes what its preset knows of it."""
+    from dataclasses import replace
 
-    frame, colon, kind = text.partition(":")
-    if not colon:
-        return frame
-    if kind not in COMPONENTS:
-        raise UnknownNameError("kind of contact", kind, COMPONENTS)
-    return Contact(frame, kind=kind)  # type: ignore[arg-type]
+    from copsense.contact import COMPONENTS, Contact, rectangle
+    from copsense.robots import PRESETS
+
+    known = PRESETS[robot].contacts if robot in PRESETS else ()
+    contacts: list[Contact] = [] if texts else list(known)
+    for text in texts:
+        frame, colon, kind = text.partition(":")
+        if colon and kind not in COMPONENTS:
+            raise UnknownNameError("kind of contact", kind, COMPONENTS)
+        own = next((c for c in known if c.frame == frame), Contact(frame))
+        contacts.append(replace(own, kind=kind) if colon else own)  # type: ignore[arg-type]
+    if sole is not None:
+        polygon = rectangle(*_read_rectangle(sole))
+        contacts = [replace(c, polygon=polygon) if c.kind == "surface" else c for c in contacts]
+    if sole_height is not None:
+        contacts = [
+            replace(c, offset=(0.0, 0.0, sole_height)) if c.kind == "surface" else c
+            for c in contacts
+        ]
+    return list(contacts) or None
+
+
+def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:
+    try:
+        x0, x1, y0, y1 = (float(number) for number in text.split(":"))
+    except ValueError:
+        raise InvalidInputError(
+            f"{text!r} is not of the form X0:X1:Y0:Y1 [m], such as -0.07:0.12:-0.045:0.05."
+        ) from None
+    if not (x0 < x1 and y0 < y1):
+        raise InvalidInputError(f"the sole {text!r} is empty: X0 < X1 and Y0 < Y1 are needed.")
+    return (x0, x1), (y0, y1)
 
 
 def read_assignments(texts: tuple[str, ...]) -> dict[str, float]:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from copsense.motion import Path as MotionPath
     from copsense.stance import Stance
 
+_OVER_LIMIT = 1e-6  # rad: less is rounding
+
 
 @click.command(
     epilog="Example: copsense sweep icub --com-y -0.07:0.07:201 --criterion minimum-wrench "
@@ -90,6 +92,14 @@ def sweep(
         echo_json(summary)
     else:
         _print(summary)
+    beyond = dataset["joint_limit_excess"].max("posture")
+    for name in beyond["joint"].values[beyond.values > _OVER_LIMIT]:
+        count = int((dataset["joint_limit_excess"].sel(joint=name) > _OVER_LIMIT).sum())
+        excess = math.degrees(float(beyond.sel(joint=name)))
+        click.echo(
+            f"note: {name} is beyond its limit at {count} postures, by up to {excess:.1f} deg",
+            err=True,
+        )
     for posture, criterion, reason in failures[:5]:
         click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
     if len(failures) > 5:

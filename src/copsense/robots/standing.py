@@ -218,11 +218,12 @@ def _complete(
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if mode == "sole":
             offset = offset + up * (sole.height - up @ offset)
-        elif not preset and abs(sole.height - up @ offset) > _OFF_SOLE:
+        elif not preset and at is None and abs(sole.height - up @ offset) > _OFF_SOLE:
+            away = abs(sole.height - up @ offset) * 1e3
             warnings.warn(
-                f"contact {contact.name!r} is {abs(sole.height - up @ offset) * 1e3:.1f} mm from the "
-                "bottom of its collision geometry. Give contact_at='sole' to put the contact there, or "
-                "contact_at='frame' to keep it.",
+                f"contact {contact.name!r} is {away:.1f} mm from the bottom of its collision "
+                "geometry. Give contact_at='sole' to put it there, or contact_at='frame' to keep "
+                "it.",
                 ContactGeometryWarning,
                 stacklevel=3,
             )
