@@ -105,7 +105,9 @@ def load_stance(
         else np.array(base_rpy or (0, 0, 0))
     )
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
-    return stand(robot, chosen, q, width=width if width is not None or not preset else preset.width)
+    if width is None and preset and len(chosen) == len(preset.contacts):
+        width = preset.width
+    return stand(robot, chosen, q, width=width)
 
 
 def stand(
