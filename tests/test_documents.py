@@ -1,0 +1,56 @@
+"""Code shown is code run: the examples, the README's and the documentation's snippets."""
+
+import re
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return [code for name, code in FENCE.findall(page.read_text("utf-8")) if name == language]
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs_and_its_numbers_hold(example):
+    assert "assert" in example.read_text("utf-8"), "an example asserts a number"
+    runpy.run_path(str(example))
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/adding.md"])
+def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    snippets = blocks(ROOT / page, "python")
+    assert snippets
+    exec(compile("\n".join(snippets), page, "exec"), {"__name__": "snippet"})
+
+
+def test_commands_of_the_readme_run(tmp_path):
+    commands = [
+        line.removeprefix("$ ")
+        for block in blocks(ROOT / "README.md", "console")
+        for line in block.splitlines()
+        if line.startswith("$ copsense") and "reproduce" not in line  # has a test of its own
+    ]
+    assert commands
+    for command in commands:
+        done = subprocess.run(
+            [sys.executable, "-c", "from copsense.cli import main; main()", *command.split()[1:]],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, f"{command}\n{done.stderr}"
+
+
+def test_citation_gives_the_version():
+    import copsense
+
+    citation = (ROOT / "CITATION.cff").read_text("utf-8")
+    assert f"\nversion: {copsense.__version__}\n" in citation
