@@ -110,3 +110,21 @@ class SensitivityMismatchError(CopsenseError):
 
 class OutputError(CopsenseError):
     """A file cannot be written where it was asked for, or would overwrite another."""
+
+
+class InfeasibleError(CopsenseError):
+    """No contact wrench respects the limits.
+
+    Attributes:
+        violation: the least amount by which every limit would have to give way [N, Nm].
+        demands: the limits that demand it.
+    """
+
+    def __init__(self, violation: float, demands: tuple[str, ...]) -> None:
+        """Compose the message from the violation and who demands it."""
+        self.violation, self.demands = violation, demands
+        super().__init__(
+            f"no wrench balances the robot within the limits: each would have to give way by "
+            f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax one of "
+            "these limits, or move the posture."
+        )

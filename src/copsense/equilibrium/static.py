@@ -124,7 +124,7 @@ class StaticEquilibrium:
         return tuple(name for name, fz in zip(names, normal, strict=True) if test(fz))
 
 
-def solve_equilibrium(stance: Stance, criterion: Criterion | WrenchLaw) -> StaticEquilibrium:
+def solve_static(stance: Stance, criterion: Criterion | WrenchLaw) -> StaticEquilibrium:
     """The static equilibrium that a criterion chooses ([Romano2016] Eq. (7), (9)).
 
     Args:
