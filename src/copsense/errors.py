@@ -125,6 +125,6 @@ class InfeasibleError(CopsenseError):
         self.violation, self.demands = violation, demands
         super().__init__(
             f"no wrench balances the robot within the limits: each would have to give way by "
-            f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax one of "
-            "these limits, or move the posture."
+            f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax "
+            "one of these limits, or move the posture."
         )

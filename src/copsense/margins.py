@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.optimize
@@ -78,7 +79,7 @@ class Travel:
 
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
-    table = _Rows(equilibrium.stance, limits)
+    table = margin_table(equilibrium.stance, limits)
     values = table.values(equilibrium.forces, equilibrium.torques)
     return tuple(table.margin(rows, values) for rows in table.groups)
 
@@ -110,7 +111,7 @@ def limit_travel(
     """
     if direction not in (1, -1):
         raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    table = _Rows(stance, limits)
+    table = margin_table(stance, limits)
     planar = stance.robot.base_nv != 6
     x, y0 = None if planar else float(stance.com[0]), float(stance.com[1])
 
@@ -135,7 +136,9 @@ def limit_travel(
     found = []
     for rows in table.groups:
         margin = table.margin(rows, values)
-        closing = np.where(rates[rows] < -_STILL, -values[rows] / np.minimum(rates[rows], -_STILL), np.inf)
+        closing = np.where(
+            rates[rows] < -_STILL, -values[rows] / np.minimum(rates[rows], -_STILL), np.inf
+        )
         exact = _first_crossing(rows, walked, lambda s, near: at(y0 + direction * s, near)[1])
         found.append(LimitTravel(margin, float(closing.min()), exact))
     found.sort(key=lambda f: (np.inf if f.exact is None else f.exact, f.first_order))
@@ -146,7 +149,7 @@ def _first_crossing(rows, walked, evaluate):  # type: ignore[no-untyped-def]
     """Smallest travel at which one of the rows is at its bound; None if all stay within."""
     if np.any(walked[0][2][rows] < 0):
         return 0.0
-    for (a, near, before), (b, _, after) in zip(walked[:-1], walked[1:], strict=True):
+    for (a, near, before), (b, _, after) in pairwise(walked):
         crossed = [i for i in rows if before[i] >= 0 > after[i]]
         if crossed:
             return min(
@@ -160,10 +163,23 @@ def _first_crossing(rows, walked, evaluate):  # type: ignore[no-untyped-def]
     return None
 
 
-class _Rows:
-    """Rows of limits in their own units, grouped by contact or joint and kind."""
+def margin_table(stance: Stance, limits: Limits) -> MarginTable:
+    """The rows of limits at a stance, to be evaluated at many equilibria of its path."""
+    return MarginTable(stance, limits)
+
+
+class MarginTable:
+    """Rows of limits in their own units, grouped by contact or joint and kind.
+
+    Attributes:
+        names: what each row limits (r,).
+        kinds: the kind of each row (r,).
+        where: the contact or joint of each row (r,).
+        groups: indices of the rows of each contact or joint and kind.
+    """
 
     def __init__(self, stance: Stance, limits: Limits) -> None:
+        """Lay the rows out."""
         rows = limit_rows(stance, limits)
         self.contact_rows, self.fz = rows, _normal_rows(stance)
         joints = np.flatnonzero(np.isfinite(rows.torque))
