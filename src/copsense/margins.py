@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -145,21 +145,25 @@ def limit_travel(
     return Travel(direction, tuple(found), walked[-1][0])
 
 
-def _first_crossing(rows, walked, evaluate):  # type: ignore[no-untyped-def]
+def _first_crossing(
+    rows: np.ndarray,
+    walked: list[tuple[float, Stance, np.ndarray]],
+    evaluate: Callable[[float, Stance], np.ndarray],
+) -> float | None:
     """Smallest travel at which one of the rows is at its bound; None if all stay within."""
     if np.any(walked[0][2][rows] < 0):
         return 0.0
     for (a, near, before), (b, _, after) in pairwise(walked):
         crossed = [i for i in rows if before[i] >= 0 > after[i]]
         if crossed:
-            return min(
-                float(
-                    scipy.optimize.brentq(
-                        lambda s, i=i, near=near: evaluate(s, near)[i], a, b, xtol=_PRECISION
-                    )
-                )
-                for i in crossed
-            )
+            roots = []
+            for i in crossed:
+
+                def one(s: float, row: int = i, start: Stance = near) -> float:
+                    return float(evaluate(s, start)[row])
+
+                roots.append(float(scipy.optimize.brentq(one, a, b, xtol=_PRECISION)))
+            return min(roots)
     return None
 
 
@@ -223,7 +227,7 @@ class MarginTable:
         change[cop] = (change[cop] - values[:k][cop] * df[fz]) / at.forces[fz]
         return np.concatenate([change, -self.sign * dtau[self.joint]])
 
-    def margin(self, rows: Sequence[int], values: np.ndarray) -> LimitMargin:
+    def margin(self, rows: np.ndarray, values: np.ndarray) -> LimitMargin:
         """The smallest of a group."""
         i = int(rows[int(np.argmin(values[rows]))])
         kind = self.kinds[i]

@@ -19,6 +19,7 @@ is found by trying them, a complementarity problem of their number.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -267,7 +268,8 @@ class _Problem:
         m = len(self.g)
         return x[self.nb : self.nb + m], x[self.nb + m :]
 
-    def _bordered(self, held: np.ndarray):  # type: ignore[no-untyped-def]
+    def _bordered(self, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """A solver of the KKT system with these rows held, scaled and refined."""
         nb, m, a = self.nb, len(self.g), len(held)
         K = np.zeros((nb + m + a, nb + m + a))
         K[:nb, nb : nb + m] = self.Jb.T
@@ -296,7 +298,7 @@ class _Problem:
         """d f, d tau and d l of the held rows along V, with these rows held."""
         nb = self.nb
         AV = self.stance.balance_derivative(at.forces) @ V
-        # Stationarity J nu = W_f (f - f_ref) + A_c' l, nu_j = W tau + s l: its change at fixed f, l.
+        # Stationarity: J nu = W_f (f - f_ref) + A_c' l, nu_j = W tau + s l, here at fixed f and l.
         change = self.stance.motion_derivative(at.multipliers) @ V
         change += self.Jj @ (self.W @ AV[nb:])
         if self.quadratic.inertia:
