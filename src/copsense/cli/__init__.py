@@ -13,6 +13,7 @@ import click
 
 from copsense._version import __version__
 from copsense.cli.analyse import analyse
+from copsense.cli.design import design
 from copsense.cli.four_bar import four_bar
 from copsense.cli.reproduce import reproduce
 from copsense.cli.robots import robots
@@ -33,7 +34,7 @@ def copsense() -> None:
     """
 
 
-for _command in (robots, four_bar, analyse, sweep, plot, reproduce):
+for _command in (robots, four_bar, analyse, sweep, plot, design, reproduce):
     copsense.add_command(_command)
 
 
