@@ -10,9 +10,9 @@ from jaxtyping import install_import_hook
 # Every shape that copsense annotates is checked while the suite runs, and only then.
 install_import_hook("copsense", "shape_checks.check")
 
-import pytest
+import pytest  # noqa: E402
 
-import copsense
+import copsense  # noqa: E402
 
 
 @pytest.fixture(scope="session")

@@ -36,3 +36,27 @@ def relative(given, expected):
     given, expected = np.asarray(given), np.asarray(expected)
     assert given.shape == expected.shape
     return float(np.abs(given - expected).max() / np.abs(expected).max())
+
+
+def outcome(stance, criterion):
+    """Everything that a criterion decides at a stance: CoPs, wrenches and torques, end to end."""
+    found = copsense.solve_equilibrium(stance, criterion)
+    cops = copsense.contact_cops(found)
+    return np.concatenate([cops.ravel(), found.wrenches.ravel(), found.torques])
+
+
+def derivative_errors(stance, criterion):
+    """Errors of the analytic derivatives of CoPs, wrenches and torques along every motion."""
+    found = copsense.cop_sensitivity(stance, criterion)
+    numeric = along(stance, lambda at: outcome(at, criterion), stance.admissible_motions)
+    nc = len(stance.contacts)
+    cops, wrenches, torques = np.split(numeric, [2 * nc, 8 * nc])
+    errors = {
+        "wrench": largest_error(found.wrench_derivative, wrenches),
+        "torque": largest_error(found.torque_derivative, torques),
+    }
+    if np.any(found.raw):  # a point contact's CoP stands still
+        errors["cop"] = largest_error(found.raw, cops)
+    else:
+        assert not np.any(cops)
+    return errors
