@@ -74,6 +74,11 @@ class Criterion:
         """Refuse an empty sum and factors that would turn a minimum into a maximum."""
         if not self.terms:
             raise InvalidInputError(f"criterion {self.name!r} has no term to minimise. Give one.")
+        if not isinstance(self.tie_break, Criterion | None):
+            raise InvalidInputError(
+                f"criterion {self.name!r}: the tie-break {self.tie_break!r} is no criterion. Give "
+                "one, such as minimum_wrench(1.0)."
+            )
         for term in self.terms:
             finite_number(
                 term.scale, f"the scale of a term of criterion {self.name!r}", positive=True
@@ -298,8 +303,8 @@ def _torque_matrix(criterion: str, term: TorqueTerm, stance: Stance) -> np.ndarr
         for joint in weights:
             if joint not in names:
                 raise UnknownNameError(f"joint in the weights of {criterion!r}", joint, names)
-        weights = np.array([weights.get(joint, 0.0) for joint in names])
-    array = np.asarray(weights, dtype=float)
+        weights = [weights.get(joint, 0.0) for joint in names]
+    array = _as_numbers(criterion, weights)
     if array.ndim == 0:
         array = np.full(len(names), float(array))
     return _weight_matrix(criterion, "torque", array, len(names), definite=array.ndim == 2)
@@ -313,9 +318,9 @@ def _wrench_matrix(criterion: str, term: WrenchTerm, stance: Stance) -> np.ndarr
                 raise UnknownNameError(
                     f"contact in the weights of {criterion!r}", contact, stance.contact_names
                 )
-        rows = [np.asarray(weights.get(n, np.zeros(6)), float) for n in stance.contact_names]
+        rows = [_as_numbers(criterion, weights.get(n, np.zeros(6))) for n in stance.contact_names]
     else:
-        array = np.asarray(weights, dtype=float)
+        array = _as_numbers(criterion, weights)
         if array.ndim == 2:
             return _weight_matrix(criterion, "wrench", array, m, definite=False)
         rows = [array] * len(stance.contacts)
@@ -325,6 +330,15 @@ def _wrench_matrix(criterion: str, term: WrenchTerm, stance: Stance) -> np.ndarr
             f"Give six numbers (fx, fy, fz, mx, my, mz), or a ({m}, {m}) matrix."
         )
     return _weight_matrix(criterion, "wrench", stance.stack(np.array(rows)), m, definite=False)
+
+
+def _as_numbers(criterion: str, weights: ArrayLike) -> np.ndarray:
+    try:
+        return np.asarray(weights, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"criterion {criterion!r}: the weights {weights!r} are no numbers. Give numbers."
+        ) from None
 
 
 def _weight_matrix(

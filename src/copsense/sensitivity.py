@@ -9,9 +9,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array, finite_number
 from copsense.cop import contact_cops, half_planes
 from copsense.criterion import Criterion
-from copsense.equilibrium import StaticEquilibrium, WrenchLaw, solve_equilibrium
+from copsense.equilibrium import (
+    PROJECT,
+    StaticEquilibrium,
+    WrenchLaw,
+    is_admissible,
+    solve_equilibrium,
+)
 from copsense.errors import InvalidInputError, SensitivityMismatchError
 from copsense.posture import retract
 from copsense.stance import Stance
@@ -60,25 +67,22 @@ class CopSensitivity:
         Raises:
             InvalidInputError: the motion moves a contact, or the coordinate stands still.
         """
-        t = np.asarray(tangent, dtype=float)
-        stance = self.equilibrium.stance
-        if t.shape != (len(self.basis),) or not np.all(np.isfinite(t)):
-            raise InvalidInputError(f"the tangent must be finite, of shape ({len(self.basis)},).")
-        if np.abs(stance.jacobian @ t).max() > 1e-6 * max(1.0, float(np.abs(t).max())):
-            raise InvalidInputError(
-                "the tangent moves a contact. Project it: Z @ (Z.T @ t), Z = "
-                "stance.admissible_motions."
-            )
+        t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
+        if not is_admissible(self.equilibrium.stance, t):
+            raise InvalidInputError(f"the tangent moves a contact. {PROJECT}")
+        rate = finite_number(rate, "the coordinate's rate along the path")
         if not abs(rate) > 1e-12 * max(1.0, float(np.abs(t).max())):
             raise InvalidInputError(
-                "the coordinate does not change along this path: no derivative with respect to it."
+                "the coordinate does not change along this path: there is no derivative with "
+                "respect to it. Choose a coordinate that moves, or another path."
             )
         return self.gradient @ t / rate
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint [m/rad] along a path with this tangent."""
         index = self.equilibrium.stance.robot.velocity_index(joint)
-        return self.along(tangent, float(np.asarray(tangent)[index]))
+        t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
+        return self.along(t, float(t[index]))
 
     @cached_property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
@@ -197,8 +201,7 @@ def finite_difference_sensitivity(
     Each equilibrium is solved at a posture moved along a basis vector and pulled back onto the
     manifold.
     """
-    if not (np.isfinite(step) and step > 0):
-        raise InvalidInputError(f"the step must be positive, got {step}.")
+    step = finite_number(step, "the step of the differences [rad, m]", positive=True)
     Z = stance.admissible_motions
     wrenches, torques = [], []
     for z in Z.T:
@@ -230,6 +233,11 @@ def check_sensitivity(
     Raises:
         SensitivityMismatchError: they differ by more; the message says where and by how much.
     """
+    finite_number(tolerance, "the tolerance")
+    if not isinstance(criterion, Criterion):
+        raise InvalidInputError(
+            "a law is differentiated numerically: there is nothing to compare. Give a Criterion."
+        )
     exact = cop_sensitivity(stance, criterion)
     numeric = finite_difference_sensitivity(stance, criterion, step=step)
     pairs = {
