@@ -12,7 +12,7 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
 from copsense.cop import edge_margin
 from copsense.criterion import Criterion
-from copsense.equilibrium import WrenchLaw
+from copsense.equilibrium import WrenchLaw, law_name
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.motion import Path
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
@@ -84,11 +84,13 @@ def sweep(
     Raises:
         InvalidInputError: no criterion, or two of one name.
     """
-    names = [c.name if isinstance(c, Criterion) else c.__name__ for c in criteria]
+    if isinstance(criteria, Criterion):
+        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
+    names = [str(c.name) if isinstance(c, Criterion) else law_name(c) for c in criteria]
     if not names or len(set(names)) != len(names):
         raise InvalidInputError(
             f"a sweep needs criteria of distinct names, got {', '.join(names) or 'none'}. "
-            "Criterion.named(...) renames one."
+            "Give at least one; Criterion.named(...) renames one."
         )
     stance, shape = path.stances[0], (len(path), len(names))
     sizes = _sizes(stance)
@@ -185,9 +187,13 @@ def _dataset(
         {"long_name": "the contact would have to pull"},
     )
     data["reason"] = (first, reason.astype(str), {"long_name": "why the row failed; empty if not"})
+    # A posture that was not reached has no centre of mass, no configuration and no tangent.
     coms = np.array([s.com for s in path.stances])
-    for i in path.failures:
-        coms[i] = np.nan
+    configurations = np.array([s.q for s in path.stances])
+    tangents = np.array(path.tangents)
+    excess = np.array([s.joint_limit_excess for s in path.stances])
+    for values_of in (coms, configurations, tangents, excess):
+        values_of[list(path.failures)] = np.nan
     data["com"] = (
         ("posture", "com_axis"),
         coms,
@@ -195,17 +201,17 @@ def _dataset(
     )
     data["configuration"] = (
         ("posture", "configuration_index"),
-        np.array([s.q for s in path.stances]),
+        configurations,
         {"long_name": "base position, quaternion (x, y, z, w), joints", "units": "m, 1, rad"},
     )
     data["tangent"] = (
         ("posture", "velocity"),
-        path.tangents,
+        tangents,
         {"long_name": f"d configuration / d {path.coordinate}, base in its own frame"},
     )
     data["joint_limit_excess"] = (
         ("posture", "joint"),
-        np.array([s.joint_limit_excess for s in path.stances]),
+        excess,
         {"units": "rad, m", "long_name": "how far the joint is beyond the model's limits"},
     )
     places = stance.placements
