@@ -306,11 +306,6 @@ class _TieBreak:
 
 
 def _law_forces(stance: Stance, law: WrenchLaw) -> np.ndarray:
-    if not callable(law):
-        raise InvalidInputError(
-            f"{law!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, such "
-            "as criterion_named('minimum-torque')."
-        )
     what, nc, m = f"the law {law_name(law)!r}", len(stance.contacts), len(stance.component_index)
     try:
         returned = law(stance.q)
@@ -346,7 +341,16 @@ def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
 
 
 def law_name(law: object) -> str:
-    """How a law is called in results: the name of its function, or of its class."""
+    """How a law is called in results: the name of its function, or of its class.
+
+    Raises:
+        InvalidInputError: it is no law, for it cannot be called.
+    """
+    if not callable(law):
+        raise InvalidInputError(
+            f"{law!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, such "
+            "as criterion_named('minimum-torque')."
+        )
     return str(getattr(law, "__name__", type(law).__name__))
 
 

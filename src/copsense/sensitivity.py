@@ -104,7 +104,7 @@ class CopSensitivity:
         """
         energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
         values, vectors = np.linalg.eigh(energy)
-        kept = values > _MASSLESS * values[-1]
+        kept = values > _MASSLESS * values.max(initial=0.0)
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
     @cached_property
@@ -142,7 +142,11 @@ class CopSensitivity:
         sqrt(m) sigma_max(eta (Z' M Z)^(-1/2)), dimensionless: metres of CoP per metre that the
         whole mass would move.
         """
-        speeds = [np.linalg.norm(eta @ self._inverse_root, 2) for eta in self.raw]
+        # The largest singular value, 0 where the contacts leave nothing to move.
+        speeds = [
+            np.linalg.svd(eta @ self._inverse_root, compute_uv=False).max(initial=0.0)
+            for eta in self.raw
+        ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
     @cached_property

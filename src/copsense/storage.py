@@ -112,7 +112,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 "torque",
                 "cop_sensitivity",
             ):
-                columns |= _flat(name, here[name])
+                # The coordinate stands first: com_y is asked for, and known where a row failed.
+                columns = columns | _flat(name, here[name]) | columns
             frames.append(pd.DataFrame(columns))
     return pd.concat(frames).sort_values(["posture", "criterion"], kind="stable")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -232,13 +233,8 @@ def _dataset(
             _padded(polygons),
             {"units": "m", "long_name": "vertices of the sole, contact axes, last one repeated"},
         )
-    coordinates = {
+    coordinates: dict[str, Any] = {
         "posture": np.arange(len(path)),
-        path.coordinate: (
-            "posture",
-            path.values,
-            {"units": path.unit, "long_name": "coordinate of the path"},
-        ),
         "criterion": names,
         "contact": list(stance.contact_names),
         "axis": ["x", "y"],
@@ -249,19 +245,36 @@ def _dataset(
         "joint": list(stance.robot.torque_names),
         "velocity": list(stance.robot.velocity_names),
     }
+    taken = {*data, *coordinates, *(d for dims, *_ in data.values() for d in dims)}
+    coordinate = _variable_name(path.coordinate, taken)
+    coordinates[coordinate] = (
+        "posture",
+        path.values,
+        {"units": path.unit, "long_name": f"{path.coordinate}, the coordinate of the path"},
+    )
     attributes = {
         "title": f"Static centre-of-pressure sensitivity of {stance.robot.name}",
         "source": f"copsense {__version__}",
         "robot": stance.robot.name,
         "mass": stance.robot.mass,
         "weight": stance.robot.weight,
-        "coordinate": path.coordinate,
+        "coordinate": coordinate,
         "contact_frames": ", ".join(c.frame for c in stance.contacts),
         "contact_kinds": ", ".join(c.kind for c in stance.contacts),
         "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
         "the robot, force first; base velocity in the base's frame",
     }
     return xr.Dataset(data, coordinates, attributes)
+
+
+def _variable_name(name: str, taken: set[str]) -> str:
+    """A name that netCDF allows and no other variable has: a joint may be called anything."""
+    plain = re.sub(r"[^\w.-]", "_", name)
+    if not (plain[0].isalnum() or plain[0] == "_"):
+        plain = f"_{plain}"
+    while plain in taken:
+        plain += "_"
+    return plain
 
 
 def _padded(polygons: list[np.ndarray]) -> np.ndarray:
