@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array
 from copsense.errors import InvalidInputError
 
 Kind = Literal["surface", "point", "planar"]
@@ -37,13 +38,15 @@ class Plane:
 
     def __post_init__(self) -> None:
         """Refuse a plane without direction; store the unit normal."""
-        _require(np.all(np.isfinite(self.point)), f"the plane's point {self.point} is not finite")
-        length = float(np.linalg.norm(self.normal))
+        point = finite_array(self.point, "the plane's point", (3,), "x, y, z in the world [m]")
+        normal = finite_array(self.normal, "the plane's normal", (3,), "x, y, z in the world")
+        length = float(np.linalg.norm(normal))
         _require(
-            np.isfinite(length) and length > 0, f"the plane's normal {self.normal} is no direction"
+            0 < length < np.inf,
+            f"the plane's normal {self.normal} is no direction. Give one, such as (0, 0, 1)",
         )
-        unit = tuple(float(c) / length for c in self.normal)
-        object.__setattr__(self, "normal", unit)
+        object.__setattr__(self, "point", tuple(float(c) for c in point))
+        object.__setattr__(self, "normal", tuple(float(c) / length for c in normal))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,21 +82,20 @@ class Contact:
     def __post_init__(self) -> None:
         """Check every field and own the arrays."""
         label = self.name or self.frame
+        _require(label, "a contact needs its frame. Give the name of a frame in the robot's model")
         object.__setattr__(self, "name", label)
         _require(
             self.kind in COMPONENTS,
-            f"contact {label!r} is of kind {self.kind!r}; valid kinds: {', '.join(COMPONENTS)}",
+            f"contact {label!r} is of kind {self.kind!r}. Valid kinds: {', '.join(COMPONENTS)}",
         )
+        offset = finite_array(self.offset, f"the offset of contact {label!r}", (3,), "x, y, z [m]")
+        object.__setattr__(self, "offset", tuple(float(c) for c in offset))
+        rotation = finite_array(self.rotation, f"the rotation of contact {label!r}", (3, 3))
         _require(
-            len(self.offset) == 3 and bool(np.all(np.isfinite(self.offset))),
-            f"contact {label!r}: the offset must be three finite numbers [m], got {self.offset}",
-        )
-        rotation = _own(self.rotation)
-        _require(
-            rotation.shape == (3, 3)
-            and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
+            np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
             and np.linalg.det(rotation) > 0,
-            f"contact {label!r}: the rotation is no 3 x 3 rotation matrix",
+            f"contact {label!r}: the rotation is no rotation matrix. Give orthonormal, right-"
+            "handed columns",
         )
         object.__setattr__(self, "rotation", rotation)
         if self.polygon is not None:
@@ -102,7 +104,7 @@ class Contact:
             value = getattr(self, what)
             _require(
                 value is None or (np.isfinite(value) and value >= 0),
-                f"contact {label!r}: {what} must be a non-negative number, got {value}",
+                f"contact {label!r}: {what} is {value}. Give a non-negative number, or None",
             )
 
     @property
@@ -124,14 +126,14 @@ def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, 
     Raises:
         InvalidInputError: not a finite (k, 2) array of at least two distinct points.
     """
-    array = np.array(points, dtype=float)
-    _require(
-        array.ndim == 2 and array.shape[1] == 2 and bool(np.all(np.isfinite(array))),
-        f"contact {label!r}: the polygon must be a finite (k, 2) array [m], got {array.shape}",
-    )
+    array = finite_array(points, f"the polygon of contact {label!r}", (None, 2), "x, y [m]")
     # Andrew's monotone chain: no dependency on a hull that refuses flat input.
     ordered = [tuple(p) for p in np.unique(array, axis=0)]
-    _require(len(ordered) >= 2, f"contact {label!r}: the polygon needs two distinct points")
+    _require(
+        len(ordered) >= 2,
+        f"the polygon of contact {label!r} is a single point. Give two or more, or make the "
+        "contact a point contact",
+    )
 
     def half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
         chain: list[tuple[float, ...]] = []
@@ -141,7 +143,9 @@ def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, 
             chain.append(p)
         return chain[:-1]
 
-    return _own(np.array(half(ordered) + half(ordered[::-1])))
+    hull = np.array(half(ordered) + half(ordered[::-1]))
+    hull.flags.writeable = False
+    return hull
 
 
 def half_planes(
@@ -169,12 +173,6 @@ def edge_side(normal: Float[np.ndarray, " 2"]) -> str:
 
 def _turn(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _own(values: ArrayLike) -> np.ndarray:
-    array = np.array(values, dtype=float)
-    array.flags.writeable = False
-    return array
 
 
 def _require(condition: object, message: str) -> None:

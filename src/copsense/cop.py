@@ -9,9 +9,10 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array
 from copsense.contact import Plane, edge_side, half_planes
 from copsense.equilibrium import StaticEquilibrium
-from copsense.errors import InvalidInputError, UnloadedContactError
+from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.stance import Stance
 
 
@@ -61,7 +62,8 @@ def center_of_pressure(
     Raises:
         UnloadedContactError: the force has no component along the normal.
     """
-    f, m = np.asarray(force, dtype=float), np.asarray(moment, dtype=float)
+    f = finite_array(force, "the force", (3,), "x, y, z [N]")
+    m = finite_array(moment, "the moment", (3,), "x, y, z [Nm]")
     plane = plane or Plane()
     n, p0 = np.array(plane.normal), np.array(plane.point)
     along = float(n @ f)
@@ -83,7 +85,8 @@ def com_projection(stance: Stance, plane: Plane | None = None) -> Float[np.ndarr
     n, down = np.array(plane.normal), stance.robot.model.gravity.linear
     if abs(n @ down) <= 1e-12 * np.linalg.norm(down):
         raise InvalidInputError(
-            "the plane is parallel to gravity: the CoM has no projection on it."
+            "the plane is parallel to gravity: the CoM has no projection on it. Give a plane that "
+            "the vertical meets."
         )
     return np.asarray(stance.com + down * (n @ (np.array(plane.point) - stance.com)) / (n @ down))
 
@@ -128,7 +131,7 @@ def foot_rotation_indicator(
     """
     names = stance.contact_names
     if contact not in names:
-        raise InvalidInputError(f"no contact named {contact!r}. Valid: {', '.join(names)}.")
+        raise UnknownNameError("contact", contact, names)
     force, moment = _required(stance, velocity, acceleration)
     model, data = stance.robot.model, stance.robot.model.createData()
     pin.forwardKinematics(
@@ -140,7 +143,8 @@ def foot_rotation_indicator(
     rate = data.oMi[foot].act(inertia * data.a[foot] + inertia.vxiv(v))
     force, moment = force - rate.linear, moment - rate.angular
     if other_wrenches is not None:
-        others = np.array(other_wrenches, dtype=float)
+        shape, meaning = (len(names), 6), "in contact axes, force first"
+        others = finite_array(other_wrenches, "other_wrenches", shape, meaning).copy()
         others[k] = 0.0
         world = [
             np.concatenate([p.rotation @ w[:3], p.rotation @ w[3:]])
@@ -158,8 +162,16 @@ def edge_margin(polygon: Float[np.ndarray, "k 2"], point: ArrayLike) -> EdgeMarg
         polygon: convex, counter-clockwise vertices (k, 2) [m].
         point: (2,) in the same frame [m].
     """
-    normals, offsets = half_planes(polygon)
-    distances = offsets - normals @ np.asarray(point, dtype=float)
+    corners = finite_array(polygon, "the polygon", (None, 2), "x, y [m]")
+    sides = np.roll(corners, -1, axis=0) - corners
+    area = corners[:, 0] @ np.roll(corners[:, 1], -1) - corners[:, 1] @ np.roll(corners[:, 0], -1)
+    if len(corners) < 2 or area < 0 or not np.all(np.any(sides != 0, axis=1)):
+        raise InvalidInputError(
+            "the polygon does not go round a sole counter-clockwise, each vertex once. Give "
+            "Contact(..., polygon=...).polygon, which puts any points in order."
+        )
+    normals, offsets = half_planes(corners)
+    distances = offsets - normals @ finite_array(point, "the point", (2,), "x, y [m]")
     edge = int(np.argmin(distances))
     return EdgeMargin(float(distances[edge]), edge, edge_side(normals[edge]), normals[edge])
 
@@ -176,12 +188,8 @@ def _required(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Force and moment about the world's origin that the environment must supply."""
     model = stance.robot.model
-    v, a = np.asarray(velocity, dtype=float), np.asarray(acceleration, dtype=float)
-    for what, array in (("velocity", v), ("acceleration", a)):
-        if array.shape != (model.nv,) or not np.all(np.isfinite(array)):
-            raise InvalidInputError(
-                f"the {what} must be finite and of shape ({model.nv},); got {array.shape}."
-            )
+    v = finite_array(velocity, "the velocity", (model.nv,), "the base in its frame, then joints")
+    a = finite_array(acceleration, "the acceleration", (model.nv,), "as the velocity")
     rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), stance.q, v, a)
     force = rate.linear - stance.robot.mass * model.gravity.linear
     return force, rate.angular + np.cross(stance.com, force)

@@ -17,11 +17,12 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array, finite_number
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
-TorqueWeights = float | Mapping[str, float] | np.ndarray | Literal["1/limit^2", "inverse inertia"]
-WrenchWeights = np.ndarray | Mapping[str, ArrayLike]
+TorqueWeights = ArrayLike | Mapping[str, float] | Literal["1/limit^2", "inverse inertia"]
+WrenchWeights = ArrayLike | Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +74,15 @@ class Criterion:
         """Refuse an empty sum and factors that would turn a minimum into a maximum."""
         if not self.terms:
             raise InvalidInputError(f"criterion {self.name!r} has no term to minimise. Give one.")
+        if not isinstance(self.tie_break, Criterion | None):
+            raise InvalidInputError(
+                f"criterion {self.name!r}: the tie-break {self.tie_break!r} is no criterion. Give "
+                "one, such as minimum_wrench(1.0)."
+            )
         for term in self.terms:
-            _positive(term.scale, f"the scale of a term of criterion {self.name!r}")
+            finite_number(
+                term.scale, f"the scale of a term of criterion {self.name!r}", positive=True
+            )
 
     def named(self, name: str) -> Criterion:
         """The same criterion under another name."""
@@ -207,7 +215,10 @@ def reference_wrench(
         name: how it is called in results.
     """
     weights = _norm_weights(characteristic_length)
-    return Criterion(name, (WrenchTerm(weights, np.array(reference, dtype=float)),))
+    wrenches = finite_array(
+        reference, f"the reference of criterion {name!r}", (None, 6), "fx, fy, fz, mx, my, mz"
+    )
+    return Criterion(name, (WrenchTerm(weights, wrenches),))
 
 
 def mixed(
@@ -221,7 +232,11 @@ def mixed(
         name: how it is called in results.
     """
     terms = tuple(
-        replace(term, scale=term.scale * _positive(factor, "the factor of a mixed criterion"))
+        replace(
+            term,
+            scale=term.scale
+            * finite_number(factor, "the factor of a mixed criterion", positive=True),
+        )
         for part, factor in parts
         for term in part.terms
     )
@@ -254,7 +269,15 @@ def criterion_named(name: str, characteristic_length: float = 1.0) -> Criterion:
 
 
 def _norm_weights(characteristic_length: float) -> Float[np.ndarray, " 6"]:
-    moment = 1.0 / _positive(characteristic_length, "the characteristic length L") ** 2
+    what = "the characteristic length L [m]"
+    length = finite_number(characteristic_length, what, positive=True)
+    # Beyond these no solver of double precision keeps force and moment apart from nothing.
+    if not 1e-6 <= length <= 1e6:
+        raise InvalidInputError(
+            f"{what} is {length:g}: a force or a moment would count for nothing. Give a length "
+            "between 1e-6 and 1e6; the paper means 1."
+        )
+    moment = 1.0 / length**2
     return np.array([1.0, 1.0, 1.0, moment, moment, moment])
 
 
@@ -280,8 +303,8 @@ def _torque_matrix(criterion: str, term: TorqueTerm, stance: Stance) -> np.ndarr
         for joint in weights:
             if joint not in names:
                 raise UnknownNameError(f"joint in the weights of {criterion!r}", joint, names)
-        weights = np.array([float(weights.get(joint, 0.0)) for joint in names])
-    array = np.asarray(weights, dtype=float)
+        weights = [weights.get(joint, 0.0) for joint in names]
+    array = _as_numbers(criterion, weights)
     if array.ndim == 0:
         array = np.full(len(names), float(array))
     return _weight_matrix(criterion, "torque", array, len(names), definite=array.ndim == 2)
@@ -295,18 +318,27 @@ def _wrench_matrix(criterion: str, term: WrenchTerm, stance: Stance) -> np.ndarr
                 raise UnknownNameError(
                     f"contact in the weights of {criterion!r}", contact, stance.contact_names
                 )
-        rows = [np.asarray(weights.get(n, np.zeros(6)), float) for n in stance.contact_names]
+        rows = [_as_numbers(criterion, weights.get(n, np.zeros(6))) for n in stance.contact_names]
     else:
-        array = np.asarray(weights, dtype=float)
+        array = _as_numbers(criterion, weights)
         if array.ndim == 2:
             return _weight_matrix(criterion, "wrench", array, m, definite=False)
         rows = [array] * len(stance.contacts)
     if any(row.shape != (6,) for row in rows):
         raise InvalidInputError(
-            f"criterion {criterion!r}: wrench weights are six numbers per contact "
-            f"(fx, fy, fz, mx, my, mz) or a ({m}, {m}) matrix."
+            f"criterion {criterion!r}: the wrench weights have another shape than the contacts. "
+            f"Give six numbers (fx, fy, fz, mx, my, mz), or a ({m}, {m}) matrix."
         )
     return _weight_matrix(criterion, "wrench", stance.stack(np.array(rows)), m, definite=False)
+
+
+def _as_numbers(criterion: str, weights: ArrayLike) -> np.ndarray:
+    try:
+        return np.asarray(weights, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(
+            f"criterion {criterion!r}: the weights {weights!r} are no numbers. Give numbers."
+        ) from None
 
 
 def _weight_matrix(
@@ -316,15 +348,21 @@ def _weight_matrix(
     matrix = np.diag(array) if array.ndim == 1 else array
     if matrix.shape != (size, size):
         raise InvalidInputError(
-            f"criterion {criterion!r}: {what} weights have shape {array.shape}; the stance needs "
-            f"({size},) or ({size}, {size})."
+            f"criterion {criterion!r}: {what} weights have shape {array.shape}. Give shape "
+            f"({size},) or ({size}, {size}) for this stance."
         )
     if not np.all(np.isfinite(matrix)):
-        raise InvalidInputError(f"criterion {criterion!r}: {what} weights are not finite.")
-    if not np.allclose(matrix, matrix.T, rtol=1e-10, atol=0):
-        raise InvalidInputError(f"criterion {criterion!r}: {what} weights are not symmetric.")
+        raise InvalidInputError(
+            f"criterion {criterion!r}: {what} weights are not finite. Give finite numbers."
+        )
+    largest = float(np.abs(matrix).max(initial=0.0))
+    if not np.all(np.abs(matrix - matrix.T) <= 1e-10 * largest):
+        raise InvalidInputError(
+            f"criterion {criterion!r}: {what} weights are not symmetric. Give (W + W') / 2."
+        )
+    if not size:
+        return matrix
     lowest = float(np.linalg.eigvalsh(matrix)[0])
-    largest = float(np.abs(matrix).max())
     if lowest < -1e-12 * largest or (definite and lowest <= 1e-12 * largest):
         need = "positive definite" if definite else "positive semidefinite"
         raise InvalidInputError(
@@ -336,16 +374,7 @@ def _weight_matrix(
 
 
 def _reference(criterion: str, reference: np.ndarray, stance: Stance) -> np.ndarray:
-    if reference.shape != (len(stance.contacts), 6) or not np.all(np.isfinite(reference)):
-        raise InvalidInputError(
-            f"criterion {criterion!r}: the reference must be finite wrenches of shape "
-            f"({len(stance.contacts)}, 6); got shape {reference.shape}."
-        )
-    return reference
-
-
-def _positive(value: float, what: str) -> float:
-    number = float(value)
-    if not (np.isfinite(number) and number > 0):
-        raise InvalidInputError(f"{what} must be a positive number, got {value}.")
-    return number
+    what = f"the reference of criterion {criterion!r}"
+    return finite_array(
+        reference, what, (len(stance.contacts), 6), "fx, fy, fz, mx, my, mz of each contact"
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Any
 
 _LISTED = 40  # names that an error lists at most
 
@@ -23,11 +24,13 @@ class UnknownNameError(CopsenseError, KeyError):
         kind: what was looked up, e.g. ``"frame"``.
         name: the name as given.
         valid: the valid names.
+        remedy: what else may be done, or nothing.
     """
 
     def __init__(self, kind: str, name: object, valid: Iterable[str], remedy: str = "") -> None:
         """Store the data and compose the message with the nearest valid names."""
         self.kind, self.name, self.valid = kind, str(name), tuple(valid)
+        self.remedy = remedy
         lowered = {choice.lower(): choice for choice in self.valid}
         near = difflib.get_close_matches(self.name.lower(), lowered, n=3, cutoff=0.5)
         hint = f" Did you mean {' or '.join(lowered[n] for n in near)}?" if near else ""
@@ -46,6 +49,10 @@ class UnknownNameError(CopsenseError, KeyError):
         """The message itself: KeyError would show its repr."""
         return self.message
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built from the data, not from the message."""
+        return type(self), (self.kind, self.name, self.valid, self.remedy)
+
 
 class ModelLoadError(CopsenseError):
     """A robot description could not be read (missing, malformed, or with a missing mesh)."""
@@ -56,11 +63,15 @@ class MissingExtraError(CopsenseError, ImportError):
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         """Compose the message from the package, the extra that brings it, and why."""
-        self.package, self.extra = package, extra
+        self.package, self.extra, self.purpose = package, extra, purpose
         super().__init__(
             f"{purpose} needs the package {package!r}. Install it with: "
             f'pip install "copsense[{extra}]"'
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.package, self.extra, self.purpose)
 
 
 class ContactGeometryError(CopsenseError):
@@ -98,6 +109,10 @@ class UnloadedContactError(CopsenseError):
             f"no normal force on {', '.join(contacts)}: the centre of pressure is undefined "
             "there. Move the posture off this point, or remove the contact from the stance."
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.contacts,)
 
 
 class UnreachablePostureError(CopsenseError):

@@ -11,9 +11,12 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_number
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.posture import Posture, PostureCost, contact_error, pull_back, solve_posture
 from copsense.stance import Stance
+
+_MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +77,8 @@ def lateral_sweep(
     """
     if com_x is None and stance.robot.base_nv == 6:
         com_x = float(np.mean([world.translation[0] for world in stance.placements]))
+    if com_x is not None:
+        com_x = finite_number(com_x, "com_x [m]")
 
     def request(y: float) -> dict[str, Any]:
         return {"com": (com_x, y, None), "cost": cost}
@@ -134,7 +139,7 @@ def path_through(
     """
     stances: list[Stance] = []
     for number, q in enumerate(configurations):
-        found = stance.at(np.asarray(q, dtype=float), check=False)
+        found = stance.at(q, check=False)
         error = float(np.abs(contact_error(found, stance.placements)).max())
         if project:
             found = pull_back(found, stance.placements)
@@ -157,11 +162,12 @@ def path_through(
 
 
 def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
-    if not (np.isfinite(start) and np.isfinite(stop)):
-        raise InvalidInputError(f"the ends of a sweep must be finite, got {start} and {stop}.")
-    if count < 1:
-        raise InvalidInputError(f"a sweep has at least one posture; got a count of {count}.")
-    return np.linspace(start, stop, count)
+    start, stop = finite_number(start, "a sweep's start"), finite_number(stop, "a sweep's stop")
+    if int(count) != count or not 1 <= count <= _MOST_POSTURES:
+        raise InvalidInputError(
+            f"a sweep of {count} postures cannot be made. Give a count from 1 to {_MOST_POSTURES}."
+        )
+    return np.linspace(start, stop, int(count))
 
 
 def _sweep(

@@ -10,6 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array, finite_number
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.stance import Stance
 
@@ -37,9 +38,7 @@ class PostureCost:
     def __post_init__(self) -> None:
         """Refuse a weight that would leave a joint undetermined."""
         for name in ("base_rotation", "supporting", "free"):
-            weight = getattr(self, name)
-            if not (np.isfinite(weight) and weight > 0):
-                raise InvalidInputError(f"posture weight {name} must be positive, got {weight}.")
+            finite_number(getattr(self, name), f"the posture weight {name}", positive=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +86,24 @@ def solve_posture(
     robot = stance.robot
     cost = cost or PostureCost()
     joints = dict(joints or {})
-    wanted = [(i, float(value)) for i, value in enumerate(com) if value is not None]
-    if len(com) != 3 or not np.all(np.isfinite([v for _, v in wanted] + list(joints.values()))):
-        raise InvalidInputError(f"com must be three numbers or None and joints finite, got {com}.")
+    if len(com) != 3:
+        raise InvalidInputError(
+            f"com has {len(com)} entries. Give x, y and z [m], None where one is free."
+        )
+    wanted = [
+        (i, finite_number(value, f"the CoM's {'xyz'[i]} [m]"))
+        for i, value in enumerate(com)
+        if value is not None
+    ]
+    for joint, position in joints.items():
+        joints[joint] = finite_number(position, f"the position of joint {joint!r}")
     places = tuple(stance.placements if targets is None else targets)
     if len(places) != len(stance.contacts):
         raise InvalidInputError(
-            f"{len(places)} targets for {len(stance.contacts)} contacts: give one for each."
+            f"there are {len(places)} targets for {len(stance.contacts)} contacts. Give one each."
         )
+    for contact, place in zip(stance.contacts, places, strict=True):
+        finite_array(place.homogeneous, f"the target of contact {contact.name!r}", (4, 4))
     home = stance.q if reference is None else robot.check_configuration(reference)
     columns = [robot.velocity_index(joint) for joint in joints]
     weights = _weights(stance, cost)
@@ -152,6 +161,7 @@ def retract(stance: Stance, displacement: Float[np.ndarray, " nv"]) -> Stance:
         UnreachablePostureError: the displacement leads to no posture with the contacts in place.
     """
     model = stance.robot.model
+    displacement = finite_array(displacement, "the displacement", (model.nv,), "a velocity")
     moved = stance.at(pin.integrate(model, stance.q, displacement), check=False)
     return pull_back(moved, stance.placements)
 
@@ -243,7 +253,7 @@ def _what_remains(
     labels = [f"contact {row}" for row in stance.row_names]
     labels += [f"CoM {'xyz'[i]}" for i in axes] + [f"joint {joint}" for joint in joints]
     worst = int(np.argmax(np.abs(h)))
-    asked = ", ".join(f"CoM {'xyz'[i]} = {round(value, 6):g} m" for i, value in wanted)
+    asked = ", ".join(f"CoM {'xyz'[i]} = {round(value, 6) + 0.0:g} m" for i, value in wanted)
     return (
         f"no posture of {stance.robot.name!r} with the contacts in place was found"
         + (f" for {asked}" if asked else "")

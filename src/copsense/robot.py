@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-import tempfile
-import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.arrays import finite_array, finite_number
+from copsense.description import Description, load_description, mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
-
-
-@dataclass(frozen=True)
-class Description:
-    """The text a robot was read from, kept so that its collision geometry can be read later.
-
-    Attributes:
-        text: the XML.
-        language: ``"urdf"`` or ``"mjcf"``.
-        package_dirs: folders in which ``package://`` meshes are looked up.
-        path: the file the text came from, if any.
-    """
-
-    text: str
-    language: Literal["urdf", "mjcf"]
-    package_dirs: tuple[str, ...] = ()
-    path: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +39,33 @@ class Robot:
             root = model.joints[1].shortname() if model.njoints > 1 else "none"
             raise InvalidInputError(
                 f"robot {self.name!r} has no floating base (its first joint is {root}). Build the "
-                "pin.Model with pin.JointModelFreeFlyer() as root joint, or load it from its URDF."
+                "pin.Model with pin.JointModelFreeFlyer() as root joint, load it from its URDF, or "
+                "put a <freejoint/> in its MJCF."
             )
         masses = np.array([body.mass for body in model.inertias])
         if not np.all(np.isfinite(masses)) or np.any(masses < 0) or masses.sum() <= 0:
-            bad = [model.names[i] for i in range(1, model.njoints) if not masses[i] >= 0]
+            bad = [model.names[i] for i in range(model.njoints) if not 0 <= masses[i] < np.inf]
             raise InvalidInputError(
                 f"robot {self.name!r} has a non-positive mass (total {masses.sum():g} kg"
-                + (f", negative at {', '.join(bad)}" if bad else "")
+                + (f", negative or not finite at {', '.join(bad)}" if bad else "")
                 + "). Give its links positive masses."
+            )
+        numbers = [np.append(b.lever, b.inertia) for b in model.inertias]
+        placed = [p.homogeneous for p in model.jointPlacements]
+        bad = [
+            model.names[i]
+            for i in range(model.njoints)
+            if not (np.all(np.isfinite(numbers[i])) and np.all(np.isfinite(placed[i])))
+        ]
+        if bad:
+            raise InvalidInputError(
+                f"robot {self.name!r} has a centre of mass, inertia or placement that is not "
+                f"finite at {', '.join(bad)}. Correct the model."
+            )
+        if not 0 < np.linalg.norm(model.gravity.linear) < np.inf:
+            raise InvalidInputError(
+                f"the model of robot {self.name!r} has gravity {model.gravity.linear}: without "
+                "weight there is nothing to share. Set model.gravity.linear, in m/s^2."
             )
 
     @classmethod
@@ -82,7 +82,7 @@ class Robot:
         Raises:
             ModelLoadError: the file is missing or not a URDF.
         """
-        description = _read_description(source, "urdf", package_dirs)
+        description = load_description(source, "urdf", package_dirs)
         return cls.from_description(description, name=name)
 
     @classmethod
@@ -90,7 +90,7 @@ class Robot:
         cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
     ) -> Robot:
         """Read an MJCF file or its text, as `from_urdf`; a base without joint gets a free-flyer."""
-        description = _read_description(source, "mjcf", package_dirs)
+        description = load_description(source, "mjcf", package_dirs)
         return cls.from_description(description, name=name)
 
     @classmethod
@@ -201,12 +201,19 @@ class Robot:
 
         Raises:
             UnknownNameError: a joint is not in the model.
+            InvalidInputError: a position is not finite, or a planar base is given a heading.
         """
         displacement = np.zeros(self.model.nv)
         for joint, angle in (angles or {}).items():
-            displacement[self.velocity_index(joint)] = angle
+            index = self.velocity_index(joint)
+            displacement[index] = finite_number(angle, f"the position of joint {joint!r}")
         if base_yaw:
-            displacement[5] = base_yaw
+            if self.base_nv != 6:
+                raise InvalidInputError(
+                    f"robot {self.name!r} lives in a plane: its base has no heading. Leave the "
+                    "base's orientation out."
+                )
+            displacement[5] = finite_number(base_yaw, "the heading of the base")
         return pin.integrate(self.model, pin.neutral(self.model), displacement)
 
     def check_configuration(self, q: object) -> Float[np.ndarray, " nq"]:
@@ -215,23 +222,18 @@ class Robot:
         Raises:
             InvalidInputError: wrong shape, NaN or infinity, or an unnormalised quaternion.
         """
-        try:
-            array = np.array(q, dtype=float)
-        except (TypeError, ValueError):
-            raise InvalidInputError("the configuration q is not an array of numbers") from None
-        if array.shape != (self.model.nq,):
-            raise InvalidInputError(
-                f"the configuration q of robot {self.name!r} has shape ({self.model.nq},): base "
-                f"position, quaternion (x, y, z, w), then {len(self.joint_names)} joints; "
-                f"got shape {array.shape}."
-            )
-        if not np.all(np.isfinite(array)):
-            where = ", ".join(str(i) for i in np.flatnonzero(~np.isfinite(array)))
-            raise InvalidInputError(f"the configuration q is not finite at index {where}.")
+        meaning = (
+            f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
+            if self.base_nv == 6
+            else f"base position, cosine and sine, then {len(self.joint_names)} joints"
+        )
+        array = finite_array(
+            q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
+        )
         if not pin.isNormalized(self.model, array, 1e-6):
             raise InvalidInputError(
                 "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
-                "length. Order is x, y, z, w; pin.normalize(model, q) mends rounding."
+                "length. Give it in the order x, y, z, w; pin.normalize(model, q) mends rounding."
             )
         array = pin.normalize(self.model, array)
         array.flags.writeable = False
@@ -247,57 +249,12 @@ def build_model(description: Description) -> pin.Model:
             model = pin.buildModelFromMJCF(path)
             if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
                 return model
-            return pin.buildModelFromMJCF(path, pin.JointModelFreeFlyer(), "root_joint")[0]
-    except (ValueError, RuntimeError) as error:
+            base = pin.JointModelFreeFlyer()
+            return pin.buildModelAndLegacyConstraintsFromMJCF(path, base, "root_joint")[0]
+    except (ValueError, RuntimeError, LookupError) as error:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
         raise ModelLoadError(
-            f"{what} is no {description.language.upper()} that can be read: {reason}"
+            f"{what} is no {description.language.upper()} that can be read: {reason.rstrip('.')}. "
+            "Correct the file."
         ) from None
-
-
-class mjcf_file:  # noqa: N801 - a context manager, used like a function
-    """A path that holds an MJCF text, which the parser wants: its own file or a temporary one."""
-
-    def __init__(self, description: Description) -> None:
-        """Remember what to write."""
-        self.description = description
-        self.folder: tempfile.TemporaryDirectory[str] | None = None
-
-    def __enter__(self) -> str:
-        """Return the path."""
-        if self.description.path is not None:
-            return str(self.description.path)
-        self.folder = tempfile.TemporaryDirectory()
-        path = Path(self.folder.name) / "model.xml"
-        path.write_text(self.description.text, encoding="utf-8")
-        return str(path)
-
-    def __exit__(self, *_: object) -> None:
-        """Remove the temporary file."""
-        if self.folder is not None:
-            self.folder.cleanup()
-
-
-def _read_description(
-    source: str | Path, language: Literal["urdf", "mjcf"], package_dirs: Iterable[str | Path]
-) -> Description:
-    is_text = isinstance(source, str) and source.lstrip().startswith("<")
-    path = None if is_text else Path(source)
-    if path is not None and not path.is_file():
-        raise ModelLoadError(
-            f"no file at {path}. Give the path of a {language.upper()} file, or its text."
-        )
-    try:
-        text = str(source) if path is None else path.read_text(encoding="utf-8")
-        root = ET.fromstring(text.encode())
-    except (UnicodeDecodeError, ET.ParseError) as error:
-        raise ModelLoadError(f"{path or 'the text given'} is not XML: {error}") from None
-    expected = {"urdf": "robot", "mjcf": "mujoco"}[language]
-    if root.tag != expected:
-        raise ModelLoadError(
-            f"{path or 'the text given'} starts with <{root.tag}>; "
-            f"a {language.upper()} starts with <{expected}>."
-        )
-    dirs = tuple(str(folder) for folder in package_dirs)
-    return Description(text, language, dirs, path)

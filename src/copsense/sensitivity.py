@@ -9,13 +9,16 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array, finite_number
 from copsense.contact import half_planes
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.equilibrium import (
+    PROJECT,
     ConstrainedEquilibrium,
     StaticEquilibrium,
     WrenchLaw,
+    is_admissible,
     solve_equilibrium,
 )
 from copsense.errors import InvalidInputError, SensitivityMismatchError
@@ -67,18 +70,14 @@ class CopSensitivity:
         Raises:
             InvalidInputError: the motion moves a contact, or the coordinate stands still.
         """
-        t = np.asarray(tangent, dtype=float)
-        stance = self.equilibrium.stance
-        if t.shape != (len(self.basis),) or not np.all(np.isfinite(t)):
-            raise InvalidInputError(f"the tangent must be finite, of shape ({len(self.basis)},).")
-        if np.abs(stance.jacobian @ t).max() > 1e-6 * max(1.0, float(np.abs(t).max())):
-            raise InvalidInputError(
-                "the tangent moves a contact. Project it: Z @ (Z.T @ t), Z = "
-                "stance.admissible_motions."
-            )
+        t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
+        if not is_admissible(self.equilibrium.stance, t):
+            raise InvalidInputError(f"the tangent moves a contact. {PROJECT}")
+        rate = finite_number(rate, "the coordinate's rate along the path")
         if not abs(rate) > 1e-12 * max(1.0, float(np.abs(t).max())):
             raise InvalidInputError(
-                "the coordinate does not change along this path: no derivative with respect to it."
+                "the coordinate does not change along this path: there is no derivative with "
+                "respect to it. Choose a coordinate that moves, or another path."
             )
         return self.gradient @ t / rate
 
@@ -104,7 +103,8 @@ class CopSensitivity:
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint [m/rad] along a path with this tangent."""
         index = self.equilibrium.stance.robot.velocity_index(joint)
-        return self.along(tangent, float(np.asarray(tangent)[index]))
+        t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
+        return self.along(t, float(t[index]))
 
     @cached_property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
@@ -126,7 +126,7 @@ class CopSensitivity:
         """
         energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
         values, vectors = np.linalg.eigh(energy)
-        kept = values > _MASSLESS * values[-1]
+        kept = values > _MASSLESS * values.max(initial=0.0)
         return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
     @cached_property
@@ -164,7 +164,11 @@ class CopSensitivity:
         sqrt(m) sigma_max(eta (Z' M Z)^(-1/2)), dimensionless: metres of CoP per metre that the
         whole mass would move.
         """
-        speeds = [np.linalg.norm(eta @ self._inverse_root, 2) for eta in self.raw]
+        # The largest singular value, 0 where the contacts leave nothing to move.
+        speeds = [
+            np.linalg.svd(eta @ self._inverse_root, compute_uv=False).max(initial=0.0)
+            for eta in self.raw
+        ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
     @cached_property
@@ -234,8 +238,7 @@ def finite_difference_sensitivity(
     Each equilibrium is solved at a posture moved along a basis vector and pulled back onto the
     manifold.
     """
-    if not (np.isfinite(step) and step > 0):
-        raise InvalidInputError(f"the step must be positive, got {step}.")
+    step = finite_number(step, "the step of the differences [rad, m]", positive=True)
     Z = stance.admissible_motions
     wrenches, torques = [], []
     for z in Z.T:
@@ -274,6 +277,11 @@ def check_sensitivity(
     Raises:
         SensitivityMismatchError: they differ by more; the message says where and by how much.
     """
+    finite_number(tolerance, "the tolerance")
+    if not isinstance(criterion, Criterion):
+        raise InvalidInputError(
+            "a law is differentiated numerically: there is nothing to compare. Give a Criterion."
+        )
     exact = cop_sensitivity(stance, criterion, limits)
     numeric = finite_difference_sensitivity(stance, criterion, limits, step=step)
     pairs = {

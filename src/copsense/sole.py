@@ -10,9 +10,11 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.arrays import finite_number
 from copsense.contact import Contact, convex_polygon
+from copsense.description import mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError
-from copsense.robot import Robot, build_model, mjcf_file
+from copsense.robot import Robot, build_model
 
 THICKNESS = 1e-3  # m: what lies within this of the lowest point belongs to the sole
 _RIM = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)  # samples of a round rim
@@ -44,7 +46,10 @@ def read_sole(robot: Robot, contact: Contact, *, thickness: float = THICKNESS) -
     Raises:
         ModelLoadError: a mesh is missing, or the link has no collision geometry.
         InvalidInputError: the robot has no description to read geometry from.
+        UnknownNameError: the contact's frame is not in the model.
     """
+    finite_number(thickness, "the thickness of a sole [m]", positive=True)
+    robot.frame(contact.frame)
     vertices = _foot_vertices(robot, contact)
     lowest = float(vertices[:, 2].min())
     sole = vertices[vertices[:, 2] <= lowest + thickness]
@@ -63,7 +68,7 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
     description = robot.description
     if description is None:
         raise InvalidInputError(
-            f"robot {robot.name!r} was given as a model, without geometry: give each contact its "
+            f"robot {robot.name!r} was given as a model, without geometry. Give each contact its "
             "polygon, or load the robot from its URDF or MJCF."
         )
     model = build_model(description)  # unreduced: geometry hangs on the joints of the file
@@ -80,10 +85,10 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
             with mjcf_file(description) as path:
                 shapes = pin.buildGeomFromMJCF(model, path, pin.GeometryType.COLLISION)
     except (ValueError, RuntimeError) as error:
+        reason = str(error).strip().splitlines()[0].rstrip(".")
         raise ModelLoadError(
-            f"the collision geometry under frame {contact.frame!r} could not be read: "
-            f"{str(error).strip().splitlines()[0]}. Give package_dirs= (--package-dir) for its "
-            "meshes, or the contact's polygon."
+            f"the collision geometry under frame {contact.frame!r} could not be read: {reason}. "
+            "Give package_dirs= (--package-dir) for its meshes, or the contact's polygon."
         ) from None
     found = [
         np.array([axes.actInv(shape.placement.act(v)) for v in _shape_vertices(shape, axes)])
@@ -92,8 +97,8 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
     ]
     if not found:
         raise ModelLoadError(
-            f"no collision geometry is attached to frame {contact.frame!r}: give the contact its "
-            "polygon."
+            f"no collision geometry is attached to frame {contact.frame!r}. Give the contact its "
+            "polygon (--sole X0:X1:Y0:Y1)."
         )
     return np.vstack(found)
 

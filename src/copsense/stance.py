@@ -54,7 +54,10 @@ class Stance:
 
     def __post_init__(self, check: bool) -> None:
         """Check the input and run the kinematics once."""
-        contacts = tuple(self.contacts)
+        contacts = (self.contacts,) if isinstance(self.contacts, Contact) else tuple(self.contacts)
+        for contact in contacts:
+            if not isinstance(contact, Contact):
+                raise InvalidInputError(f"{contact!r} is no contact. Give Contact(frame=...).")
         object.__setattr__(self, "contacts", contacts)
         names = [contact.name for contact in contacts]
         if not names:
@@ -63,10 +66,17 @@ class Stance:
                 f"frames of {self.robot.name!r}: {', '.join(self.robot.frame_names)}."
             )
         if len(set(names)) != len(names):
-            raise InvalidInputError(f"two contacts share a name: {', '.join(names)}. Name each.")
+            raise InvalidInputError(
+                f"two contacts share a name: {', '.join(names)}. Give each frame once, or name "
+                "the contacts apart with Contact(name=...)."
+            )
         object.__setattr__(self, "q", self.robot.check_configuration(self.q))
         for contact in contacts:
-            self.robot.frame(contact.frame)
+            if self.robot.frame(contact.frame).parentJoint == 0:
+                raise InvalidInputError(
+                    f"frame {contact.frame!r} of contact {contact.name!r} is fixed in the world: "
+                    "it is no part of the robot. Name a frame of a foot."
+                )
         model = self.robot.model
         data = model.createData()
         object.__setattr__(self, "_data", data)
@@ -77,7 +87,9 @@ class Stance:
 
     def at(self, q: ArrayLike, *, check: bool = True) -> Stance:
         """The same stance at another configuration."""
-        return replace(self, q=np.asarray(q, dtype=float), check=check)
+        if not isinstance(q, np.ndarray):
+            q = self.robot.check_configuration(q)
+        return replace(self, q=q, check=check)
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
         """The same robot and configuration on other contacts."""

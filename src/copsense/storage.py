@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from copsense.arrays import finite_array
 from copsense.errors import InvalidInputError, OutputError
 
 _SUFFIXES = (".nc", ".csv")
@@ -26,6 +28,7 @@ def write_results(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = Fa
         InvalidInputError: another suffix.
         OutputError: the file exists, or cannot be written.
     """
+    _check_sweep(dataset, "this dataset is", "Give what copsense.sweep returns")
     path = check_output(path, suffixes=_SUFFIXES, overwrite=overwrite)
     if path.suffix == ".nc":
         write_beside(path, lambda temporary: _write_netcdf(dataset, temporary))
@@ -41,20 +44,17 @@ def load_results(path: str | Path) -> xr.Dataset:
         InvalidInputError: no such file, or not a sweep of copsense.
     """
     path = Path(path)
-    if not path.is_file():
-        raise InvalidInputError(
-            f"no file at {path}. Write one with: copsense sweep ... --output FILE.nc"
-        )
+    write_one = "Write one with: copsense sweep ... --output FILE.nc"
+    if not _tells(path.is_file):
+        raise InvalidInputError(f"no file at {str(path)[:300]!r}. {write_one}.")
     try:
         with xr.open_dataset(path, engine="netcdf4") as opened:
             dataset = opened.load()
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"{path} is no netCDF file that can be read: {error}") from None
-    missing = {"cop", "wrench", "reason"} - set(dataset.variables)
-    if missing:
+    except (OSError, ValueError, RuntimeError) as error:
         raise InvalidInputError(
-            f"{path} is no sweep of copsense: it lacks {', '.join(sorted(missing))}."
-        )
+            f"{path} is no netCDF file that can be read: {error}. {write_one}."
+        ) from None
+    _check_sweep(dataset, f"{path} is", write_one)
     dataset["pulling"] = dataset["pulling"].astype(bool)
     return dataset
 
@@ -66,15 +66,19 @@ def load_configurations(path: str | Path) -> np.ndarray:
         InvalidInputError: no such file, or not a table of numbers.
     """
     path = Path(path)
+    need = "Give .npy, or .csv without a heading, with nq numbers a row"
+    if not _tells(path.is_file):
+        raise InvalidInputError(f"no file of configurations at {str(path)[:300]!r}. {need}.")
     try:
-        rows = np.load(path) if path.suffix == ".npy" else np.loadtxt(path, delimiter=",", ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(
-            f"{path} is no table of configurations (.npy, or .csv with nq numbers a row): {error}"
-        ) from None
-    if rows.ndim != 2 or not len(rows):
-        raise InvalidInputError(f"{path} must hold rows of nq numbers; got shape {rows.shape}.")
-    return np.asarray(rows, dtype=float)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty file is refused below
+            npy = path.suffix == ".npy"
+            rows = np.load(path) if npy else np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError, EOFError) as error:
+        raise InvalidInputError(f"{path} is no table of configurations: {error}. {need}.") from None
+    if not isinstance(rows, np.ndarray) or not rows.size:
+        raise InvalidInputError(f"{path} holds no table of configurations. {need}.")
+    return finite_array(rows, str(path), (None, None), "nq numbers a row")
 
 
 def table(dataset: xr.Dataset) -> pd.DataFrame:
@@ -108,7 +112,8 @@ def table(dataset: xr.Dataset) -> pd.DataFrame:
                 "torque",
                 "cop_sensitivity",
             ):
-                columns |= _flat(name, here[name])
+                # The coordinate stands first: com_y is asked for, and known where a row failed.
+                columns = columns | _flat(name, here[name]) | columns
             frames.append(pd.DataFrame(columns))
     return pd.concat(frames).sort_values(["posture", "criterion"], kind="stable")
 
@@ -121,26 +126,65 @@ def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool
         OutputError: the file exists and may not be overwritten, or its folder cannot be written.
     """
     path = Path(path)
+    if "\0" in str(path):
+        raise OutputError(f"{str(path)!r} is no path. Leave the null character out.")
     if suffixes and path.suffix not in suffixes:
         raise InvalidInputError(
-            f"{path.name!r} has no known suffix; choose {' or '.join(suffixes)}."
+            f"the output {path.name!r} has no known suffix. Choose {' or '.join(suffixes)}."
         )
-    if path.exists() and (path.is_dir() or not overwrite):
-        what = "is a folder" if path.is_dir() else "exists already"
-        raise OutputError(f"{path} {what}. Give another path, or --force (overwrite=True).")
+    if _tells(path.is_dir):
+        raise OutputError(f"{path} is a folder. Give the path of a file.")
+    if _tells(path.exists) and not overwrite:
+        raise OutputError(f"{path} exists already. Give another path, or --force (overwrite=True).")
     folder = path.parent
-    if not folder.is_dir():
+    if not _tells(folder.is_dir):
         raise OutputError(f"there is no folder {folder} to write {path.name} in. Create it first.")
-    if not os.access(folder, os.W_OK):
-        raise OutputError(f"the folder {folder} cannot be written to. Choose another.")
+    # Asking for permissions answers wrongly (for root, on /proc, on a full disk): try.
+    _temporary(path).unlink()
     return path
+
+
+def _temporary(path: Path) -> Path:
+    """A new empty file beside a path.
+
+    Raises:
+        OutputError: none can be made there, or the path's own name is not possible.
+    """
+    try:
+        path.exists()  # raises where the name is too long for the folder
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".copsense-", suffix=path.suffix)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(
+            f"{str(path)[:300]!r} cannot be written: {reason}. Choose another path."
+        ) from None
+    os.close(handle)
+    return Path(name)
+
+
+def _tells(test: Callable[[], bool]) -> bool:
+    """What a question about a path says; no, for a name that nothing can have."""
+    try:
+        return test()
+    except OSError:
+        return False
+
+
+def _check_sweep(dataset: xr.Dataset, what: str, remedy: str) -> None:
+    """Refuse a dataset that is not what `copsense.sweep.sweep` returns."""
+    known = {"cop", "wrench", "torque", "com", "reason", "pulling", "margin", "cop_sensitivity"}
+    missing = sorted(known - set(map(str, dataset.variables)))
+    if "coordinate" not in dataset.attrs:
+        missing.append("the attribute 'coordinate'")
+    if missing:
+        raise InvalidInputError(
+            f"{what} no sweep of copsense: it lacks {', '.join(missing)}. {remedy}."
+        )
 
 
 def write_beside(path: Path, write: Callable[[Path], object]) -> None:
     """Run `write` on a temporary file beside `path`, then rename it there."""
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
+    temporary = _temporary(path)
     try:
         write(temporary)
         # mkstemp is private to its user; a result file has the usual permissions.
@@ -148,8 +192,10 @@ def write_beside(path: Path, write: Callable[[Path], object]) -> None:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         temporary.replace(path)
-    except OSError as error:
-        raise OutputError(f"{path} could not be written: {error}.") from None
+    except (OSError, RuntimeError) as error:  # the netCDF library raises the latter
+        raise OutputError(
+            f"{path} could not be written: {error}. Free some space, or choose another path."
+        ) from None
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
 from copsense.cop import edge_margin
 from copsense.criterion import Criterion
-from copsense.equilibrium import ConstrainedEquilibrium, WrenchLaw
+from copsense.equilibrium import ConstrainedEquilibrium, WrenchLaw, law_name
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits
 from copsense.motion import Path
@@ -88,11 +89,13 @@ def sweep(
     Raises:
         InvalidInputError: no criterion, or two of one name.
     """
-    names = [c.name if isinstance(c, Criterion) else c.__name__ for c in criteria]
+    if isinstance(criteria, Criterion):
+        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
+    names = [str(c.name) if isinstance(c, Criterion) else law_name(c) for c in criteria]
     if not names or len(set(names)) != len(names):
         raise InvalidInputError(
             f"a sweep needs criteria of distinct names, got {', '.join(names) or 'none'}. "
-            "Criterion.named(...) renames one."
+            "Give at least one; Criterion.named(...) renames one."
         )
     stance, shape = path.stances[0], (len(path), len(names))
     sizes = _sizes(stance)
@@ -197,9 +200,13 @@ def _dataset(
         {"long_name": "the contact would have to pull"},
     )
     data["reason"] = (first, reason.astype(str), {"long_name": "why the row failed; empty if not"})
+    # A posture that was not reached has no centre of mass, no configuration and no tangent.
     coms = np.array([s.com for s in path.stances])
-    for i in path.failures:
-        coms[i] = np.nan
+    configurations = np.array([s.q for s in path.stances])
+    tangents = np.array(path.tangents)
+    excess = np.array([s.joint_limit_excess for s in path.stances])
+    for values_of in (coms, configurations, tangents, excess):
+        values_of[list(path.failures)] = np.nan
     data["com"] = (
         ("posture", "com_axis"),
         coms,
@@ -207,17 +214,17 @@ def _dataset(
     )
     data["configuration"] = (
         ("posture", "configuration_index"),
-        np.array([s.q for s in path.stances]),
+        configurations,
         {"long_name": "base position, quaternion (x, y, z, w), joints", "units": "m, 1, rad"},
     )
     data["tangent"] = (
         ("posture", "velocity"),
-        path.tangents,
+        tangents,
         {"long_name": f"d configuration / d {path.coordinate}, base in its own frame"},
     )
     data["joint_limit_excess"] = (
         ("posture", "joint"),
-        np.array([s.joint_limit_excess for s in path.stances]),
+        excess,
         {"units": "rad, m", "long_name": "how far the joint is beyond the model's limits"},
     )
     places = stance.placements
@@ -238,13 +245,8 @@ def _dataset(
             _padded(polygons),
             {"units": "m", "long_name": "vertices of the sole, contact axes, last one repeated"},
         )
-    coordinates = {
+    coordinates: dict[str, Any] = {
         "posture": np.arange(len(path)),
-        path.coordinate: (
-            "posture",
-            path.values,
-            {"units": path.unit, "long_name": "coordinate of the path"},
-        ),
         "criterion": names,
         "contact": list(stance.contact_names),
         "axis": ["x", "y"],
@@ -255,19 +257,36 @@ def _dataset(
         "joint": list(stance.robot.torque_names),
         "velocity": list(stance.robot.velocity_names),
     }
+    taken = {*data, *coordinates, *(d for dims, *_ in data.values() for d in dims)}
+    coordinate = _variable_name(path.coordinate, taken)
+    coordinates[coordinate] = (
+        "posture",
+        path.values,
+        {"units": path.unit, "long_name": f"{path.coordinate}, the coordinate of the path"},
+    )
     attributes = {
         "title": f"Static centre-of-pressure sensitivity of {stance.robot.name}",
         "source": f"copsense {__version__}",
         "robot": stance.robot.name,
         "mass": stance.robot.mass,
         "weight": stance.robot.weight,
-        "coordinate": path.coordinate,
+        "coordinate": coordinate,
         "contact_frames": ", ".join(c.frame for c in stance.contacts),
         "contact_kinds": ", ".join(c.kind for c in stance.contacts),
         "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
         "the robot, force first; base velocity in the base's frame",
     }
     return xr.Dataset(data, coordinates, attributes)
+
+
+def _variable_name(name: str, taken: set[str]) -> str:
+    """A name that netCDF allows and no other variable has: a joint may be called anything."""
+    plain = re.sub(r"[^\w.-]", "_", name)
+    if not (plain[0].isalnum() or plain[0] == "_"):
+        plain = f"_{plain}"
+    while plain in taken:
+        plain += "_"
+    return plain
 
 
 def _padded(polygons: list[np.ndarray]) -> np.ndarray:

@@ -42,7 +42,9 @@ def main() -> None:
     """Run the command line; an error of copsense is a line, not a traceback."""
     warnings.showwarning = _show_warning
     try:
-        sys.exit(copsense.main(standalone_mode=False) or 0)
+        code = copsense.main(standalone_mode=False) or 0
+        sys.stdout.flush()
+        sys.exit(code)
     except CopsenseError as error:
         click.echo(f"error: {error}", err=True)
     except click.UsageError as error:
@@ -55,6 +57,9 @@ def main() -> None:
     except BrokenPipeError:
         sys.stderr.close()  # whoever read our output has seen enough
         sys.exit(0)
+    except OSError as error:
+        # Standard output: files have errors of their own.
+        click.echo(f"error: the answer could not be printed: {error}.", err=True)
     sys.exit(2)
 
 

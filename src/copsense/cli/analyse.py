@@ -66,12 +66,12 @@ def analyse(
     from copsense.sensitivity import check_sensitivity, cop_sensitivity
     from copsense.storage import check_output
 
-    if picture:
+    if picture is not None:
         check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
     held = {joint: math.radians(deg) for joint, deg in read_assignments(joints).items()}
     home = read_stance(robot, **options)
-    if along:
+    if along is not None:
         home.robot.velocity_index(along)
     planar = home.robot.base_nv != 6
     x = com_x if com_x is not None else None if planar else float(home.com[0])
@@ -95,7 +95,7 @@ def analyse(
         if excess > 1e-6
     ]
     answer["checked"] = check
-    if picture:
+    if picture is not None:
         from copsense.plots import plot_stance, save_figure
 
         save_figure(plot_stance(stance, list(results.values())), picture, overwrite=force)

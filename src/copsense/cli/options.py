@@ -50,7 +50,7 @@ def stance_options(command: F) -> F:
             "--sole-height",
             type=float,
             metavar="M",
-            help="Height of the contact plane over the model's frames, along their z [m].",
+            help="Height of the contact plane over the model's frames, along its normal [m].",
         ),
         click.option(
             "--package-dir",
@@ -147,15 +147,28 @@ def _read_contacts(
             raise UnknownNameError("kind of contact", kind, COMPONENTS)
         own = next((c for c in known if c.frame == frame), Contact(frame))
         contacts.append(replace(own, kind=kind) if colon else own)  # type: ignore[arg-type]
+    described = sole is not None or sole_height is not None
+    if described and contacts and all(c.kind == "point" for c in contacts):
+        raise InvalidInputError(
+            "--sole and --sole-height describe a sole, and every contact is a point. Leave them "
+            "out, or give a surface contact: --contact FRAME:surface."
+        )
     if sole is not None:
         polygon = rectangle(*_read_rectangle(sole))
-        contacts = [replace(c, polygon=polygon) if c.kind == "surface" else c for c in contacts]
+        contacts = [replace(c, polygon=polygon) if c.kind != "point" else c for c in contacts]
     if sole_height is not None:
-        contacts = [
-            replace(c, offset=(0.0, 0.0, sole_height)) if c.kind == "surface" else c
-            for c in contacts
-        ]
+        if not math.isfinite(sole_height):
+            raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
+        contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
+
+
+def _raised(contact: Contact, height: float) -> Contact:
+    """The contact with its plane that high over the model's frame, along its own z."""
+    from dataclasses import replace
+
+    x, y, z = (float(c) * height for c in contact.rotation[:, 2])
+    return replace(contact, offset=(x, y, z))
 
 
 def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -163,10 +176,13 @@ def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]
         x0, x1, y0, y1 = (float(number) for number in text.split(":"))
     except ValueError:
         raise InvalidInputError(
-            f"{text!r} is not of the form X0:X1:Y0:Y1 [m], such as -0.07:0.12:-0.045:0.05."
+            f"the sole {text!r} is not understood. Give X0:X1:Y0:Y1 [m], such as "
+            "-0.07:0.12:-0.045:0.05."
         ) from None
-    if not (x0 < x1 and y0 < y1):
-        raise InvalidInputError(f"the sole {text!r} is empty: X0 < X1 and Y0 < Y1 are needed.")
+    if not (-math.inf < x0 < x1 < math.inf and -math.inf < y0 < y1 < math.inf):
+        raise InvalidInputError(
+            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]."
+        )
     return (x0, x1), (y0, y1)
 
 
@@ -181,7 +197,7 @@ def read_assignments(texts: tuple[str, ...]) -> dict[str, float]:
             equals = ""
         if not (name and equals):
             raise InvalidInputError(
-                f"{text!r} is not of the form JOINT=DEGREES, such as l_knee=-20."
+                f"{text!r} is not understood. Give JOINT=DEGREES, such as l_knee=-20."
             )
     return values
 
@@ -193,7 +209,7 @@ def read_range(text: str) -> tuple[float, float, int]:
         return float(start), float(stop), int(count)
     except ValueError:
         raise InvalidInputError(
-            f"{text!r} is not of the form START:STOP:COUNT, such as -0.07:0.07:201."
+            f"the range {text!r} is not understood. Give START:STOP:COUNT, such as -0.07:0.07:201."
         ) from None
 
 

@@ -79,7 +79,7 @@ def sweep(
             "say what to sweep, one of: --com-y START:STOP:COUNT [m], "
             "--joint NAME=START:STOP:COUNT [deg], --configurations FILE."
         )
-    if output:
+    if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
@@ -88,7 +88,7 @@ def sweep(
         dataset = evaluate(path, chosen, within, progress=update)
     dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
     failures = failed_rows(dataset)
-    if output:
+    if output is not None:
         write_results(dataset, output, overwrite=force)
     summary = _summary(dataset, output, failures)
     if as_json:
@@ -123,8 +123,8 @@ def plot(file: str, output: str | None, force: bool) -> None:
     from copsense.plots import plot_results, save_figure
     from copsense.storage import check_output, load_results
 
-    path = Path(output) if output else Path(file).with_suffix(".png")
     dataset = load_results(file)
+    path = Path(file).with_suffix(".png") if output is None else Path(output)
     check_output(path, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
     save_figure(plot_results(dataset), path, overwrite=force)
     click.echo(str(path))

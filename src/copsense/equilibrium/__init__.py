@@ -10,8 +10,11 @@ from copsense.equilibrium.constrained import (
     solve_constrained,
 )
 from copsense.equilibrium.static import (
+    PROJECT,
     StaticEquilibrium,
     WrenchLaw,
+    is_admissible,
+    law_name,
     solve_static,
     wrench_law,
 )
@@ -20,11 +23,14 @@ from copsense.limits import Limits
 from copsense.stance import Stance
 
 __all__ = [
+    "PROJECT",
     "ActiveLimit",
     "ConstrainedEquilibrium",
     "Rates",
     "StaticEquilibrium",
     "WrenchLaw",
+    "is_admissible",
+    "law_name",
     "solve_equilibrium",
     "wrench_law",
 ]

@@ -20,15 +20,18 @@ import pinocchio as pin
 import scipy.linalg
 from jaxtyping import Float
 
+from copsense.arrays import finite_array
 from copsense.criterion import Criterion, Quadratic
-from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.errors import CopsenseError, InvalidInputError, UndeterminedWrenchError
 from copsense.stance import Stance
 
 # Reciprocal condition number under which the KKT matrix is examined for lost directions.
 _RCOND = 1e-13
 _NULL = 1e-10  # singular values, relative, that count as lost
 UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
-_BALANCE = 1e-6  # share of the weight by which a user's wrenches may miss the balance
+_BALANCE = 1e-6  # share of the weight by which wrenches may miss the balance
+
+PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
 
 WrenchLaw = Callable[[np.ndarray], np.ndarray]
 
@@ -105,12 +108,18 @@ class StaticEquilibrium:
             d forces (m, p) and d torques (n, p).
 
         Raises:
+            InvalidInputError: a direction moves a contact.
             UndeterminedWrenchError: the rank of the contacts changes at this very posture.
         """
         if not isinstance(self.criterion, Criterion):
             raise InvalidInputError(
-                "a law has no analytic derivative: cop_sensitivity differentiates it numerically."
+                "a law has no analytic derivative. Use cop_sensitivity, which differentiates it "
+                "numerically."
             )
+        nv = self.stance.robot.model.nv
+        directions = finite_array(directions, "the directions", (nv, None), "columns with J V = 0")
+        if not is_admissible(self.stance, directions):
+            raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
         return self._system.derivative(self, directions)
 
     @cached_property
@@ -142,6 +151,11 @@ def solve_static(stance: Stance, criterion: Criterion | WrenchLaw) -> StaticEqui
         return StaticEquilibrium(stance, criterion, forces, torques, np.zeros_like(stance.gravity))
     system = _Kkt(stance, criterion)
     equilibrium = StaticEquilibrium(stance, criterion, *system.solution)
+    if not _imbalance(stance, equilibrium.forces) <= _BALANCE * stance.robot.weight:
+        raise InvalidInputError(
+            f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
+            "its weights are too large, too small or too far apart. Bring them nearer to one."
+        )
     # Kept for the derivatives, which use the same factorisation.
     equilibrium.__dict__["_system"] = system
     return equilibrium
@@ -292,23 +306,58 @@ class _TieBreak:
 
 
 def _law_forces(stance: Stance, law: WrenchLaw) -> np.ndarray:
-    wrenches = np.asarray(law(stance.q), dtype=float)
-    m = len(stance.component_index)
-    if wrenches.shape == (len(stance.contacts), 6):
-        wrenches = stance.stack(wrenches)
-    if wrenches.shape != (m,) or not np.all(np.isfinite(wrenches)):
+    what, nc, m = f"the law {law_name(law)!r}", len(stance.contacts), len(stance.component_index)
+    try:
+        returned = law(stance.q)
+    except CopsenseError:
+        raise
+    except Exception as error:
         raise InvalidInputError(
-            f"the law must return finite wrenches of shape ({len(stance.contacts)}, 6) in contact "
-            f"axes, or ({m},) stacked; got shape {wrenches.shape}."
-        )
-    nb = stance.robot.base_nv
-    imbalance = np.abs(stance.jacobian[:, :nb].T @ wrenches - stance.gravity[:nb]).max()
+            f"{what} raised {type(error).__name__}: {error}. Mend it at this posture, or keep the "
+            "posture out."
+        ) from error
+    stacked = isinstance(returned, np.ndarray) and returned.ndim == 1
+    wrenches = finite_array(
+        returned,
+        f"what {what} returned",
+        (m,) if stacked else (nc, 6),
+        "stacked forces" if stacked else "wrenches in contact axes, force first",
+    )
+    if not stacked:
+        wrenches = stance.stack(wrenches)
+    imbalance = _imbalance(stance, wrenches)
     if imbalance > _BALANCE * stance.robot.weight:
         raise InvalidInputError(
-            f"the law's wrenches do not balance gravity: {imbalance:.3g} N or Nm remain on the "
-            "base. Wrenches are what the ground does to the robot, contact axes, force first."
+            f"the wrenches of {what} do not balance gravity: {imbalance:.3g} N or Nm remain on "
+            "the base. Give what the ground does to the robot, contact axes, force first."
         )
     return wrenches
+
+
+def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
+    """Whether velocities (nv,) or (nv, p) leave the contacts at rest: |J V| <= 1e-6 max(1, |V|)."""
+    moved = np.abs(stance.jacobian @ directions).max(initial=0.0)
+    return bool(moved <= 1e-6 * max(1.0, float(np.abs(directions).max(initial=0.0))))
+
+
+def law_name(law: object) -> str:
+    """How a law is called in results: the name of its function, or of its class.
+
+    Raises:
+        InvalidInputError: it is no law, for it cannot be called.
+    """
+    if not callable(law):
+        raise InvalidInputError(
+            f"{law!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, such "
+            "as criterion_named('minimum-torque')."
+        )
+    return str(getattr(law, "__name__", type(law).__name__))
+
+
+def _imbalance(stance: Stance, forces: np.ndarray) -> float:
+    """Largest force or moment on the base that contact forces leave unbalanced [N, Nm]."""
+    nb = stance.robot.base_nv
+    return float(np.abs(stance.jacobian[:, :nb].T @ forces - stance.gravity[:nb]).max())
 
 
 def _undetermined(
@@ -341,11 +390,13 @@ def wrench_law(torques: Callable[[np.ndarray], np.ndarray], stance: Stance) -> W
         if here.rank < len(here.component_index):
             raise UndeterminedWrenchError(
                 "torques do not determine the wrenches here: no torque can feel "
-                f"{', '.join(here.redundant_directions)}.",
+                f"{', '.join(here.redundant_directions)}. Give a law of wrenches instead.",
                 here.redundant_directions,
             )
         balance = here.gravity.copy()
-        balance[here.robot.base_nv :] -= torques(q)
+        balance[here.robot.base_nv :] -= finite_array(
+            torques(q), "the torques returned", (len(here.robot.torque_names),), "one per joint"
+        )
         # J' f = G - B tau: consistent where the torques hold the robot, so any inverse serves.
         return here.unstack(np.linalg.lstsq(here.jacobian.T, balance, rcond=None)[0])
 

@@ -6,13 +6,15 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from copsense.arrays import finite_array, finite_number
 from copsense.contact import Contact, Plane
+from copsense.description import is_file, load_description
 from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.posture import solve_posture
 from copsense.robot import Robot
@@ -41,15 +43,12 @@ def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | P
     if str(source) in PRESETS:
         return preset_robot(PRESETS[str(source)])
     text = str(source)
-    if text.lstrip().startswith("<"):
-        read = Robot.from_mjcf if "<mujoco" in text else Robot.from_urdf
-        return read(text, package_dirs=package_dirs)
-    path = Path(source)
-    if not path.is_file() and not path.suffix and path.parent == Path():
+    path = Path(text)
+    if not (text.lstrip().startswith("<") or is_file(path) or path.suffix) and (
+        path.parent == Path()
+    ):
         raise UnknownNameError("robot", text, PRESETS, "Or give the path of a URDF or MJCF file.")
-    if path.is_file() and "<mujoco" in path.read_text(encoding="utf-8", errors="replace"):
-        return Robot.from_mjcf(path, package_dirs=package_dirs)
-    return Robot.from_urdf(path, package_dirs=package_dirs)
+    return Robot.from_description(load_description(source, package_dirs=package_dirs))
 
 
 def load_stance(
@@ -80,15 +79,21 @@ def load_stance(
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
     """
+    if contact_at not in (None, *get_args(ContactAt)):
+        raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     preset = PRESETS.get(source) if isinstance(source, str) else None
     robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
     if contacts is None:
         if preset is None:
+            likely = likely_feet(robot)
             raise InvalidInputError(
-                f"robot {robot.name!r} is no preset: name its contact frames. "
-                f"Likely ones: {', '.join(likely_feet(robot)) or 'none found'}."
+                f"robot {robot.name!r} is no preset, so its contacts are not known. Name their "
+                f"frames, contacts=[...] (--contact FRAME); {'likely ones' if likely else 'all'}: "
+                f"{', '.join(likely or robot.frame_names)}."
             )
         chosen: tuple[Contact, ...] = preset.contacts
+    elif isinstance(contacts, str):
+        raise InvalidInputError(f"contacts is one name, {contacts!r}. Give a list, [{contacts!r}].")
     else:
         chosen = tuple(Contact(c) if isinstance(c, str) else c for c in contacts)
         preset_frames = {c.frame: c for c in preset.contacts} if preset else {}
@@ -99,11 +104,14 @@ def load_stance(
     chosen = _complete(robot, chosen, preset, contact_at)
     angles = {j: float(np.radians(a)) for j, a in preset.posture.items()} if preset else {}
     q = robot.configuration(angles | dict(posture or {}))
-    rpy = (
-        np.radians(preset.base_rpy)
-        if preset and base_rpy is None
-        else np.array(base_rpy or (0, 0, 0))
-    )
+    if base_rpy is not None and robot.base_nv != 6:
+        raise InvalidInputError(
+            f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
+            "base_rpy (--base-yaw) out."
+        )
+    rpy = np.radians(preset.base_rpy if preset else (0.0, 0.0, 0.0))
+    if base_rpy is not None:
+        rpy = finite_array(base_rpy, "base_rpy (--base-yaw)", (3,), "roll, pitch, yaw [rad]")
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
@@ -147,9 +155,11 @@ def stand(
         origin = place.translation.copy()
         if width is not None:
             if len(contacts) != 2:
-                raise InvalidInputError(f"a stance width needs two contacts, got {len(contacts)}.")
-            if not (np.isfinite(width) and width > 0):
-                raise InvalidInputError(f"the stance width must be positive [m], got {width}.")
+                raise InvalidInputError(
+                    f"a stance width is a distance between two contacts, but there are "
+                    f"{len(contacts)}. Leave width out."
+                )
+            finite_number(width, "the stance width [m]", positive=True)
             left = place.translation[1] >= loose.placements[1 - k].translation[1]
             origin[:2] = 0.0, width / 2 if left else -width / 2
         origin[2] -= _height(contact, origin)

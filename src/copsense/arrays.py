@@ -1,0 +1,60 @@
+"""Arrays that callers give: read-only copies, of the right shape and finite, or a clear error."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from copsense.errors import InvalidInputError
+
+
+def finite_array(
+    value: object, what: str, shape: tuple[int | None, ...], meaning: str = ""
+) -> np.ndarray:
+    """A read-only copy of an array of finite numbers.
+
+    Args:
+        value: what the caller gave.
+        what: how the message calls it, such as ``"the tangent"``.
+        shape: the shape it must have; None leaves a size free.
+        meaning: what its entries are, for the message.
+
+    Raises:
+        InvalidInputError: no numbers, another shape, or NaN or infinity.
+    """
+    sizes = ", ".join("any" if n is None else str(n) for n in shape)
+    need = f"Give finite numbers of shape ({sizes}{',' if len(shape) == 1 else ''})"
+    need += f": {meaning}." if meaning else "."
+    try:
+        if np.iscomplexobj(np.asarray(value)):
+            raise TypeError
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInputError(f"{what} is not an array of numbers. {need}") from None
+    fits = array.ndim == len(shape) and all(
+        n is None or n == size for n, size in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise InvalidInputError(f"{what} has shape {array.shape}. {need}")
+    if not np.all(np.isfinite(array)):
+        where = [", ".join(map(str, index)) for index in np.argwhere(~np.isfinite(array))[:6]]
+        raise InvalidInputError(f"{what} is not finite at index {'; '.join(where)}. {need}")
+    array.flags.writeable = False
+    return array
+
+
+def finite_number(value: object, what: str, *, positive: bool = False) -> float:
+    """One finite number, positive if asked.
+
+    Raises:
+        InvalidInputError: it is none.
+    """
+    need = "a positive finite number" if positive else "a finite number"
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number) or (positive and number <= 0):
+        raise InvalidInputError(f"{what} is {value!r}. Give {need}.")
+    return number
