@@ -143,3 +143,20 @@ class InfeasibleError(CopsenseError):
             f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax "
             "one of these limits, or move the posture."
         )
+
+
+class UnsolvedError(CopsenseError):
+    """A quadratic program that has solutions was not solved well enough to be believed.
+
+    Attributes:
+        error: the smallest violation of an optimality condition that was reached, relative.
+    """
+
+    def __init__(self, error: float) -> None:
+        """Compose the message from the violation."""
+        self.error = error
+        super().__init__(
+            f"the wrenches within the limits were not found: {error:.1e} of an optimality "
+            "condition remains. Weights of very different size, or limits that all but exclude "
+            "each other, can cause this; bring the weights nearer or relax a limit."
+        )

@@ -13,33 +13,34 @@ with a row of A for each contact limit and, for a torque limit |tau_i| <= t_i, t
     [ 0    -A_a    0  ] [ l  ]   [-b_a ]
 
 and along an admissible V the same matrix gives the derivatives. Where a row is weakly active (on
-its bound without pressing) the derivative depends on the side: the set of weak rows that stay held
-is found by trying them, a complementarity problem of their number.
+its bound without pressing) the derivative depends on the side. It is the optimum of a QP of its
+own: same cost, the pressing rows held, and the weak ones not to be crossed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
 
-import daqp
 import numpy as np
-import scipy.linalg
-import scipy.optimize
 from jaxtyping import Float
 
 from copsense.criterion import Criterion, Quadratic
+from copsense.equilibrium.program import NoPointError, Program
 from copsense.equilibrium.static import StaticEquilibrium
-from copsense.errors import InfeasibleError, InvalidInputError, UndeterminedWrenchError
+from copsense.errors import (
+    InfeasibleError,
+    InvalidInputError,
+    UndeterminedWrenchError,
+    UnsolvedError,
+)
 from copsense.limits import LimitRows, Limits, limit_rows
 from copsense.stance import Stance
 
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
+_RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
-_MOST_WEAK = 12  # weakly active rows beyond which their combinations are too many to try
 
 
 @dataclass(frozen=True)
@@ -148,6 +149,7 @@ def solve_constrained(
     Raises:
         InfeasibleError: no wrench respects the limits; says which demand how much more.
         UndeterminedWrenchError: several wrenches are equally good.
+        UnsolvedError: no solver found wrenches that meet the optimality conditions.
     """
     problem = _Problem(stance, criterion, limits)
     f, nu, multipliers, slack = problem.solve()
@@ -195,18 +197,27 @@ class _Problem:
         )
         self.names = rows.names + tuple(f"torque of {names[i]}" for i in self.joint[torque])
         self.kinds = rows.kinds + ("torque",) * int(torque.sum())
-        self.scale = np.maximum(np.linalg.norm(self.A, axis=1), 1e-300)
         self.weight = stance.robot.weight
+        self.program = Program(self.H, self.g, self.Jb, self.Gb, self.A, self.b, self.weight)
+        self.scale = self.program.scale
         self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Forces, multipliers of the statics and of the rows, slack."""
-        self._null = scipy.linalg.null_space(self.Jb.T)
-        start = np.linalg.lstsq(self.Jb.T, self.Gb, rcond=None)[0]
-        held = self._active_rows(start)
-        f, l = self._polish(held)
-        multipliers = np.zeros(len(self.b))
-        multipliers[held] = l
+        program = self.program
+        curvature = program.curvature
+        if len(curvature) and curvature[0] <= _SINGULAR * curvature[-1]:
+            raise UndeterminedWrenchError(
+                f"criterion {self.criterion.name!r} leaves wrenches undetermined, and limits with "
+                "a tie-break are not supported. Add a small share of another criterion: "
+                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
+            )
+        try:
+            found = program.solve()
+        except NoPointError as error:
+            demands = dict.fromkeys(self.names[i] for i in error.rows)
+            raise InfeasibleError(error.violation, tuple(demands)) from None
+        f, multipliers = found.x, found.multipliers
         slack = self.b - self.A @ f
         gradient = max(float(np.abs(self.H @ f - self.g).max()), 1e-300)
         touching = slack <= _TOUCHING * self.weight * self.scale
@@ -230,87 +241,31 @@ class _Problem:
         nu[: self.nb] = np.linalg.lstsq(self.Jb, left, rcond=None)[0]
         return f, nu, multipliers, slack
 
-    def _active_rows(self, start: np.ndarray) -> np.ndarray:
-        """Indices of linearly independent rows that hold at the optimum, from the QP solver."""
-        N, scale = self._null, self.scale[:, None]
-        H = N.T @ self.H @ N
-        h = N.T @ (self.H @ start - self.g)
-        values = np.linalg.eigvalsh(H)
-        if values[0] <= _SINGULAR * values[-1]:
-            raise UndeterminedWrenchError(
-                f"criterion {self.criterion.name!r} leaves wrenches undetermined, and limits with "
-                "a tie-break are not supported. Add a small share of another criterion: "
-                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
-            )
-        if not len(self.b):
-            return np.zeros(0, dtype=int)
-        A = np.ascontiguousarray(self.A @ N / scale)
-        b = (self.b - self.A @ start) / self.scale
-        size = values[-1]
-        solution, _, flag, info = daqp.solve(
-            np.ascontiguousarray(H / size),
-            np.ascontiguousarray(h / size),
-            A,
-            b,
-            np.full(len(b), -1e30),
-            np.zeros(len(b), dtype=np.int32),
-            primal_tol=1e-9 * self.weight,
-            dual_tol=1e-12,
-        )
-        if flag < 1:
-            raise self._infeasible(start)
-        del solution
-        return np.flatnonzero(np.abs(np.asarray(info["lam"])) > 0)
-
-    def _polish(self, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The exact optimum with these rows held."""
-        x = self._bordered(held)(np.concatenate([self.Gb, -self.g, -self.b[held]]))
-        m = len(self.g)
-        return x[self.nb : self.nb + m], x[self.nb + m :]
-
-    def _bordered(self, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """A solver of the KKT system with these rows held, scaled and refined."""
-        nb, m, a = self.nb, len(self.g), len(held)
-        K = np.zeros((nb + m + a, nb + m + a))
-        K[:nb, nb : nb + m] = self.Jb.T
-        K[nb : nb + m, :nb] = self.Jb
-        K[nb : nb + m, nb : nb + m] = -self.H
-        K[nb : nb + m, nb + m :] = -self.A[held].T
-        K[nb + m :, nb : nb + m] = -self.A[held]
-        d = np.ones(len(K))
-        for _ in range(3):
-            size = np.abs(d[:, None] * K * d).max(axis=1)
-            d /= np.sqrt(np.where(size > 0, size, 1.0))
-        lu = scipy.linalg.lu_factor(d[:, None] * K * d, check_finite=False)
-
-        def solve(right: np.ndarray) -> np.ndarray:
-            def once(r: np.ndarray) -> np.ndarray:
-                return (d * scipy.linalg.lu_solve(lu, (d * r.T).T, check_finite=False).T).T
-
-            x = once(right)
-            return x + once(right - K @ x)
-
-        return solve
-
     def differentiate(
         self, at: ConstrainedEquilibrium, V: Float[np.ndarray, "nv p"], held: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows along V, with these rows held."""
-        nb = self.nb
+        base, joints, change, bound = self._rates_of_data(at, V)
+        df, _, dl = self.program.hold(held, change, base, bound[held])
+        return df, joints - self.Jj.T @ df, dl
+
+    def _rates_of_data(
+        self, at: ConstrainedEquilibrium, V: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
+
+        The first in two parts, base and joints; the second with the multipliers' part.
+        """
         AV = self.stance.balance_derivative(at.forces) @ V
+        base, joints = AV[: self.nb], AV[self.nb :]
         # Stationarity: J nu = W_f (f - f_ref) + A_c' l, nu_j = W tau + s l, here at fixed f and l.
-        change = self.stance.motion_derivative(at.multipliers) @ V
-        change += self.Jj @ (self.W @ AV[nb:])
+        change = self.stance.motion_derivative(at.multipliers) @ V + self.Jj @ (self.W @ joints)
         if self.quadratic.inertia:
             change += self.Jj @ self._weight_change(at.torques, V)
-        torque_rows = self.joint[held] >= 0
-        rows = np.zeros((len(held), V.shape[1]))
-        rows[torque_rows] = (
-            self.sign[held][torque_rows, None] * AV[nb:][self.joint[held][torque_rows]]
-        )
-        x = self._bordered(held)(np.vstack([AV[:nb], -change, rows]))
-        df = x[nb : nb + len(self.g)]
-        return df, AV[nb:] - self.Jj.T @ df, x[nb + len(self.g) :]
+        bound = np.zeros((len(self.b), V.shape[1]))
+        torque = self.joint >= 0
+        bound[torque] = -self.sign[torque, None] * joints[self.joint[torque]]
+        return base, joints, change, bound
 
     def _weight_change(self, torques: np.ndarray, V: np.ndarray) -> np.ndarray:
         """(dW) tau for W = D + c M^-1: -c M^-1 dM M^-1 tau."""
@@ -322,52 +277,29 @@ class _Problem:
         return -self.quadratic.inertia * np.linalg.solve(M, moved)
 
     def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
+        """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
-        if len(weak) > _MOST_WEAK:
-            raise InvalidInputError(
-                f"{len(weak)} limits are touched without pressing at this very posture: too many "
-                "to tell the sides apart. Move a little along the path."
-            )
-        for count in range(len(weak) + 1):
-            for extra in combinations(weak, count):
-                held = np.concatenate([strong, np.array(extra, dtype=int)])
-                found = self._try(
-                    at, v, held, np.setdiff1d(weak, extra), np.array(extra, dtype=int)
-                )
-                if found:
-                    return found
-        raise InvalidInputError(
-            "the limits touched here are degenerate (dependent rows), and no one-sided derivative "
-            "was found. Move a little along the path."
-        )
-
-    def _try(
-        self,
-        at: ConstrainedEquilibrium,
-        v: np.ndarray,
-        held: np.ndarray,
-        left: np.ndarray,
-        extra: np.ndarray,
-    ) -> Rates | None:
-        """The derivative with these rows held, if no touched row is crossed or pulled at."""
+        base, joints, c, bound = (x[:, 0] for x in self._rates_of_data(at, v[:, None]))
+        E, e = np.hstack([self.Jb, self.A[strong].T]), np.concatenate([base, bound[strong]])
+        size = float(np.abs(self.differentiate(at, v[:, None], strong)[0]).max())
+        unit = max(size if np.isfinite(size) else 0.0, float(np.abs(e).max()), 1e-300)
         try:
-            df, dtau, dl = (x[:, 0] for x in self.differentiate(at, v[:, None], held))
-        except (np.linalg.LinAlgError, ValueError):
-            return None
-        if not np.all(np.isfinite(df)):
-            return None
-        slack = -self.A @ df
-        on = self.joint >= 0
-        slack[on] = -(self.sign * dtau[self.joint])[on]
-        multipliers = np.zeros(len(self.b))
-        multipliers[held] = dl
-        speed = max(float(np.abs(df).max()), 1e-300)
-        crossed = np.any(slack[left] < -1e-9 * speed * self.scale[left])
-        pulled = np.any(multipliers[extra] < -1e-9 * float(np.abs(self.H).max()) * speed)
-        if crossed or pulled:
-            return None
-        slack[held] = 0.0
-        return Rates(df, dtau, multipliers, slack)
+            found = Program(
+                self.H, c, E, e, self.A[weak], bound[weak], unit, _RATES_TOLERANCE
+            ).solve()
+        except (NoPointError, UnsolvedError):
+            raise InvalidInputError(
+                "what is touched or pressed at this very posture leaves no way along this motion "
+                f"that was found ({', '.join(self.names[i] for i in [*strong, *weak])}). The "
+                "limits may become infeasible there, or be degenerate: move a little along the "
+                "path."
+            ) from None
+        df, multipliers = found.x, np.zeros(len(self.b))
+        multipliers[strong], multipliers[weak] = -found.equality[self.nb :], found.multipliers
+        slack = bound - self.A @ df
+        slack[strong] = 0.0
+        slack[multipliers != 0] = 0.0
+        return Rates(df, joints - self.Jj.T @ df, multipliers, slack)
 
     def optimality(self, at: ConstrainedEquilibrium) -> float:
         f, l = at.forces, at.row_multipliers
@@ -385,22 +317,6 @@ class _Problem:
             np.max(np.abs(l * self.scale * slack), initial=0.0) / (size * self.weight),
         ]
         return float(max(parts))
-
-    def _infeasible(self, start: np.ndarray) -> InfeasibleError:
-        """The least violation that would make the limits feasible, and who demands it."""
-        N = self._null
-        A = np.column_stack([self.A @ N / self.scale[:, None], -np.ones(len(self.b))])
-        b = (self.b - self.A @ start) / self.scale
-        k = N.shape[1]
-        found = scipy.optimize.linprog(
-            np.eye(k + 1)[k], A_ub=A, b_ub=b, bounds=[(None, None)] * k + [(0, None)]
-        )
-        violation = float(found.x[k]) if found.status == 0 else float("nan")
-        demands: tuple[str, ...] = ()
-        if found.status == 0:
-            pressed = np.flatnonzero(-found.ineqlin.marginals > 1e-9)
-            demands = tuple(dict.fromkeys(self.names[i] for i in pressed))
-        return InfeasibleError(violation, demands)
 
 
 def _torque_weight(quadratic: Quadratic, stance: Stance) -> Float[np.ndarray, "n n"]:
