@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
 from copsense.contact import Contact, edge_side, half_planes
@@ -17,6 +18,7 @@ from copsense.stance import Stance
 
 # Effort limits from here on are a modeller's "no limit", not a motor's.
 PLACEHOLDER_TORQUE = 1e4  # Nm
+_ROUNDING = 1e-9  # m
 _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
 
 TorqueLimits = Literal["model"] | Mapping[str, float] | float
@@ -60,10 +62,23 @@ class Limits:
                 raise InvalidInputError(
                     f"limit {name} must be a non-negative number or None, got {value}."
                 )
-        if self.friction_sides < 3:
+        if not (self.friction_sides >= 3 and self.friction_sides == int(self.friction_sides)):
             raise InvalidInputError(
-                f"a friction pyramid has at least 3 sides, got {self.friction_sides}."
+                f"a friction pyramid has a whole number of sides, 3 or more; got "
+                f"{self.friction_sides}."
             )
+        if isinstance(self.torque, str):
+            if self.torque != "model":
+                raise UnknownNameError("torque limit", self.torque, ("model",))
+        elif self.torque is not None:
+            given = (
+                self.torque if isinstance(self.torque, Mapping) else {"every joint": self.torque}
+            )
+            for joint, value in given.items():
+                if not float(value) >= 0:
+                    raise InvalidInputError(
+                        f"torque limits must be non-negative numbers [Nm], got {value} for {joint}."
+                    )
 
     @property
     def any(self) -> bool:
@@ -133,8 +148,6 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
     if limits is None:
         return np.full(len(names), np.inf)
     if isinstance(limits, str):
-        if limits != "model":
-            raise UnknownNameError("torque limit", limits, ("model",))
         model = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :].copy()
         model[~((model > 0) & (model < PLACEHOLDER_TORQUE))] = np.inf
         return model
@@ -142,12 +155,8 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
         for joint in limits:
             if joint not in names:
                 raise UnknownNameError("joint in the torque limits", joint, names)
-        given = np.array([float(limits.get(joint, np.inf)) for joint in names])
-    else:
-        given = np.full(len(names), float(limits))
-    if not np.all(given >= 0):
-        raise InvalidInputError("torque limits must be non-negative numbers [Nm].")
-    return given
+        return np.array([float(limits.get(joint, np.inf)) for joint in names])
+    return np.full(len(names), float(limits))
 
 
 def torque_placeholders(stance: Stance) -> tuple[str, ...]:
@@ -173,6 +182,7 @@ def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
     if mu is not None:
         rows += _pyramid_rows(contact, mu, limits.friction_sides)
     if limits.cop_margin is not None and contact.polygon is not None and contact.kind != "point":
+        _require_room(contact, contact.polygon, limits.cop_margin)
         rows += _cop_rows(contact, contact.polygon, limits.cop_margin)
     if limits.torsion == "cone" and contact.kind == "surface":
         rows += _cone_rows(contact, mu, limits.friction_sides)
@@ -225,6 +235,29 @@ def _cop_rows(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float
         )
         for a, b in zip(normals, offsets, strict=True)
     ]
+
+
+def _require_room(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float) -> None:
+    """Refuse a sole without a point that far from its edges: it could carry no load at all."""
+    room = _room(tuple(map(tuple, polygon.tolist())), contact.kind == "planar")
+    if margin > room + _ROUNDING:
+        raise InvalidInputError(
+            f"the sole of {contact.name!r} has no point {margin:g} m inside its edges: the "
+            f"innermost one is {room:.3g} m inside. Give a smaller cop_margin."
+        )
+
+
+@cache
+def _room(polygon: tuple[tuple[float, float], ...], planar: bool) -> float:
+    """Largest distance to the nearest edge of a point of the sole (with x = 0 if planar) [m]."""
+    normals, offsets = half_planes(np.array(polygon))
+    found = linprog(
+        [0.0, 0.0, -1.0],
+        A_ub=np.column_stack([normals, np.ones(len(normals))]),
+        b_ub=offsets,
+        bounds=[(0.0, 0.0) if planar else (None, None), (None, None), (None, None)],
+    )
+    return -float(found.fun)
 
 
 def _cone_rows(contact: Contact, mu: float | None, sides: int) -> list[Row]:
