@@ -85,6 +85,8 @@ class Reproduction:
             contact frames at the soles' bottom.
         errata: the printed text against what holds.
         references: recorded values on the iCub beside those found.
+        references_at_sole: the same beside those with the contact frames at the soles' bottom,
+            to show what the frame's height changes.
         parameters: what was computed on, in words.
         versions: of this package, Python and what it rests on.
         timings: stage -> seconds.
@@ -101,6 +103,7 @@ class Reproduction:
     changed_at_sole: tuple[str, ...]
     errata: tuple[EvaluatedErratum, ...]
     references: tuple[ReferenceValue, ...]
+    references_at_sole: tuple[ReferenceValue, ...]
     parameters: Mapping[str, str]
     versions: Mapping[str, str]
     timings: Mapping[str, float]
@@ -137,16 +140,18 @@ def reproduce(*, postures: int = 141, progress: Progress | None = None) -> Repro
         claims = evaluate_four_bar_claims(four_bar)
         errata = evaluate_errata(four_bar)
     stance = load_stance(_ROBOT)
+    lowered = load_stance(_ROBOT, contact_at="sole")
     lateral = _lateral(stance, postures, clock, "iCub")
-    at_sole = _lateral(
-        load_stance(_ROBOT, contact_at="sole"), postures, clock, "iCub, sole's bottom"
-    )
+    at_sole = _lateral(lowered, postures, clock, "iCub, sole's bottom")
     with clock.stage("unit of length"):
         unit = _unit_of_length(stance)
     with clock.stage("claims"):
         icub_claims = evaluate_icub_claims(lateral, four_bar)
         there = {c.claim.identifier: c.verdict for c in evaluate_icub_claims(at_sole, four_bar)}
-        references = compare_with_reference(LateralSweep.from_dataset(lateral, four_bar))
+        references, references_at_sole = (
+            compare_with_reference(LateralSweep.from_dataset(dataset, four_bar))
+            for dataset in (lateral, at_sole)
+        )
     return Reproduction(
         four_bar=four_bar,
         four_bar_figures=figures,
@@ -160,7 +165,8 @@ def reproduce(*, postures: int = 141, progress: Progress | None = None) -> Repro
         ),
         errata=errata,
         references=references,
-        parameters=_parameters(stance, four_bar, lateral, postures),
+        references_at_sole=references_at_sole,
+        parameters=_parameters(stance, lowered, four_bar, lateral),
         versions=_versions(),
         timings=dict(clock.seconds),
         postures=postures,
@@ -262,9 +268,10 @@ def _distance(stance: Stance) -> float:
 
 
 def _parameters(
-    stance: Stance, four_bar: FourBar, lateral: xr.Dataset, postures: int
+    stance: Stance, lowered: Stance, four_bar: FourBar, lateral: xr.Dataset
 ) -> dict[str, str]:
-    cost, half = PostureCost(), _distance(stance) / 2
+    cost, half, postures = PostureCost(), _distance(stance) / 2, lateral.sizes["posture"]
+    drop = float(np.mean([c.offset[2] for c in lowered.contacts])) * 1e3
     deg = ", ".join(f"{j} {a:g}" for j, a in PRESETS[_ROBOT].posture.items() if j[0] == "l")
     return {
         "four-bar": f"l = {four_bar.leg_length:g} m, d = {four_bar.rod_length:g} m, "
@@ -275,7 +282,8 @@ def _parameters(
         f"{float(np.linalg.norm(stance.robot.model.gravity.linear)):g} m/s²",
         "posture": f"left leg and arm, the right mirrored [deg]: {deg}; others 0",
         "contacts": ", ".join(f"{c.name} ({c.kind})" for c in stance.contacts)
-        + f"; feet {2 * half:g} m apart, edges of the sole read from the collision geometry",
+        + f", at the model's frames; feet {2 * half:g} m apart; edges of the soles read from the "
+        f"collision geometry, whose bottom lies {-drop:.1f} mm under those frames",
         "path": f"{postures} postures, CoM y from {-half:g} m to {half:g} m, CoM x held over the "
         "line of the feet's frames, CoM height free; each posture is the one with the feet in "
         f"place that minimises 1/2 [{cost.base_rotation:g} |base rotation|² + sum of w (joint "

@@ -100,7 +100,7 @@ _TABLE = (
     ),
     # Recorded on a grid of 1 mm, and so rounded down to it.
     _Row(
-        "both CoPs in the soles up to |CoM_y|",
+        "both CoPs in the soles up to |CoM_y|, in steps of 1 mm",
         "m",
         ("0.038", "0.045"),
         lambda s, c: s.planted(c),

@@ -6,6 +6,8 @@ Figure where they need several. No window is opened and no figure is kept in a g
 
 from __future__ import annotations
 
+from matplotlib.figure import Figure
+
 from copsense.plots.cops import plot_cop, plot_foot_cop
 from copsense.plots.curves import (
     plot_load,
@@ -21,12 +23,13 @@ from copsense.plots.paper import (
     plot_figure_9b,
     plot_unit_of_length,
 )
-from copsense.plots.saving import save_figure
+from copsense.plots.saving import render_figure, save_figure
 from copsense.plots.soles import plot_soles
 from copsense.plots.stance import plot_stance
 from copsense.plots.summary import plot_results
 
 __all__ = [
+    "Figure",
     "plot_cop",
     "plot_criteria_curves",
     "plot_figure_3",
@@ -42,5 +45,6 @@ __all__ = [
     "plot_torques",
     "plot_travel",
     "plot_unit_of_length",
+    "render_figure",
     "save_figure",
 ]

@@ -79,11 +79,9 @@ def plot_sensitivity(dataset: xr.Dataset, *, axis: str = "y") -> Figure:
     slope = dataset["cop_slope"].sel(axis=axis).values * scale
     gain = dataset["cop_gain"].sel(axis=axis, com_direction=axis).values
     _draw_per_contact(left, dataset, slope, legend=True)
-    _draw_per_contact(right, dataset, gain, legend=False)
+    _draw_per_contact(right, dataset, gain, legend=True)
     left.set_ylabel(f"slope of CoP {axis} along the path [{words}]")
-    right.set_ylabel(f"gain dCoP$_{axis}$/dCoM$_{axis}$ [-]")
-    left.set_title("along the path")
-    right.set_title("of the least motion that moves the CoM")
+    right.set_ylabel(f"gain dCoP$_{axis}$/dCoM$_{axis}$ [m/m]")
     return figure
 
 

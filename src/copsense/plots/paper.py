@@ -22,6 +22,7 @@ from copsense.plots.style import (
     add_legend,
     axes_or_new,
     colours,
+    put_legend,
     styled,
 )
 from copsense.reproduction import UnitOfLength
@@ -40,7 +41,7 @@ def plot_figure_3(data: FigureData, criterion: str, *, ax: Axes | None = None) -
         criterion: whose it is, for the colour.
         ax: where to draw; default a new figure.
     """
-    ax = axes_or_new(ax, 4.9, 3.5)
+    ax = axes_or_new(ax)
     colour = colours([criterion])[criterion]
     for label, style in _FEET.items():
         curve = data.curve(label)
@@ -59,7 +60,7 @@ def plot_figure_3(data: FigureData, criterion: str, *, ax: Axes | None = None) -
         handles.append(
             Line2D([], [], color=MUTED, linewidth=1, linestyle=(0, (4, 3)), label="a foot unloads")
         )
-    ax.legend(handles=handles, loc="upper left")
+    put_legend(ax, handles)
     return ax
 
 
@@ -75,7 +76,7 @@ def plot_criteria_curves(
         ceiling: largest value shown, in the unit drawn; a pole goes through it.
         ax: where to draw; default a new figure.
     """
-    ax = axes_or_new(ax, 4.9, 3.5)
+    ax = axes_or_new(ax)
     colour = colours(curve.label for curve in data.curves)
     for curve in data.curves:
         _draw(ax, curve, color=colour[curve.label])
@@ -102,7 +103,7 @@ def plot_figure_9a(
         reach: largest |angle| shown [rad].
         ax: where to draw; default a new figure.
     """
-    ax = axes_or_new(ax, 4.9, 3.5)
+    ax = axes_or_new(ax)
     colour = colours(["minimum-wrench", "minimum-torque"])
     lines = four_bar_left_cops(wrench, torque, reach)
     for name, (angles, cops) in lines.items():
@@ -125,7 +126,7 @@ def plot_figure_9b(
         torque: Fig. 3b's data.
         ax: where to draw; default a new figure.
     """
-    ax = axes_or_new(ax, 4.9, 3.5)
+    ax = axes_or_new(ax)
     sideways = dataset["contact_position"].sel(com_axis="y").values
     left = str(dataset["contact"].values[int(np.argmax(sideways))])
     roll = dataset["l_hip_roll"].values
@@ -143,7 +144,7 @@ def plot_figure_9b(
 @styled
 def plot_unit_of_length(unit: UnitOfLength, *, ax: Axes | None = None) -> Axes:
     """Draw how criterion 1's sensitivity depends on the length that makes it add up."""
-    ax = axes_or_new(ax, 4.9, 3.5)
+    ax = axes_or_new(ax)
     colour = colours(["minimum-wrench", "minimum-torque"])
     ax.axhline(unit.minimum_torque, color=colour["minimum-torque"])
     ax.plot(unit.lengths, unit.closed_form, color=colour["minimum-wrench"])
@@ -179,11 +180,11 @@ def plot_unit_of_length(unit: UnitOfLength, *, ax: Axes | None = None) -> Axes:
         marker="o",
         fillstyle="none",
         linestyle="none",
-        label="minimum-wrench, iCub",
+        label="minimum-wrench",
     )
     line = Line2D([], [], color=colour["minimum-wrench"], label="L² / (L² + d²/4)")
-    torque = Line2D([], [], color=colour["minimum-torque"], label="minimum-torque, iCub")
-    ax.legend(handles=[dots, line, torque], loc="lower right", bbox_to_anchor=(1.0, 0.1))
+    torque = Line2D([], [], color=colour["minimum-torque"], label="minimum-torque")
+    put_legend(ax, [dots, line, torque])
     return ax
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
@@ -11,7 +12,11 @@ from copsense.storage import check_output, write_beside
 
 SUFFIXES = (".png", ".svg", ".pdf")
 # No date in the file: the same figure is the same file.
-_UNDATED = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}, ".png": {}}
+_UNDATED: dict[str, dict[str, None]] = {
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+    ".png": {},
+}
 
 
 def save_figure(
@@ -30,10 +35,14 @@ def save_figure(
         OutputError: the file exists, or cannot be written.
     """
     path = check_output(path, suffixes=SUFFIXES, overwrite=overwrite)
-
-    def write(temporary: Path) -> None:
-        with mpl.rc_context({"svg.hashsalt": "copsense", "svg.fonttype": "path"}):
-            figure.savefig(temporary, dpi=dpi, metadata=_UNDATED[path.suffix])
-
-    write_beside(path, write)
+    content = render_figure(figure, path.suffix, dpi=dpi)
+    write_beside(path, lambda temporary: temporary.write_bytes(content))
     return path
+
+
+def render_figure(figure: Figure, suffix: str, *, dpi: float = 160.0) -> bytes:
+    """A figure as the content of a file with that suffix; the same figure gives the same bytes."""
+    content = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "copsense", "svg.fonttype": "path"}):
+        figure.savefig(content, format=suffix[1:], dpi=dpi, metadata=_UNDATED[suffix])
+    return content.getvalue()

@@ -35,7 +35,7 @@ _ROOM = 0.12  # of the feet's extent, around them
 def plot_soles(dataset: xr.Dataset) -> Figure:
     """Draw from above where the CoPs go: a panel per criterion, coloured along the path."""
     names = labels(dataset, "criterion")
-    figure = new_figure(2.9 * len(names) + 1.0, 3.9)
+    figure = new_figure(4.1 * len(names) + 1.0, 4.6)
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     x, colour, ramp = abscissa(dataset), colours(names), _ramp()
     shade = Normalize(float(x.values.min()), float(x.values.max()))
@@ -52,7 +52,7 @@ def plot_soles(dataset: xr.Dataset) -> Figure:
     ramp_of = ScalarMappable(shade, ramp)
     bar = figure.colorbar(ramp_of, ax=list(panels), location="bottom", shrink=0.6, aspect=40)
     bar.set_label(f"{x.label}; dashed: the CoM's own track", fontsize=9)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     return figure
 
 
@@ -140,7 +140,7 @@ def _draw_ramp(
         cmap=ramp,
         norm=shade,
         linewidths=4.0,
-        capstyle="butt",
+        capstyle="projecting",
         zorder=3,
     )
     segments.set_array((along[:-1] + along[1:]) / 2)

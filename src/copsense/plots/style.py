@@ -6,6 +6,7 @@ contact.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
@@ -29,6 +30,8 @@ _KNOWN = {
 }
 _OTHERS = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#8C6D31", "#000000")
 _STYLES: tuple[Any, ...] = ("-", (0, (4.5, 1.8)), (0, (1.2, 1.4)), (0, (5, 1.4, 1.2, 1.4)))
+
+_LETTERS, _HANDLE = 17.0, 6  # per inch of a legend's row; that a handle takes
 
 _RC = {
     "font.family": "DejaVu Sans",
@@ -84,7 +87,7 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def axes_or_new(ax: Axes | None, width: float = 5.6, height: float = 3.7) -> Axes:
+def axes_or_new(ax: Axes | None, width: float = 4.9, height: float = 3.6) -> Axes:
     """The axes given, or those of a new figure."""
     return new_figure(width, height).add_subplot() if ax is None else ax
 
@@ -114,10 +117,28 @@ def add_legend(
     contacts: dict[str, Any] | None = None,
     extra: Iterable[Line2D] = (),
 ) -> None:
-    """A legend that says colour and line style once each."""
+    """A legend over the axes that says colour and line style once each."""
     handles = [Line2D([], [], color=c, label=n) for n, c in criteria.items()]
     handles += [
         Line2D([], [], color=MUTED, linestyle=style, label=name)
         for name, style in (contacts or {}).items()
     ]
-    ax.legend(handles=[*handles, *extra])
+    put_legend(ax, [*handles, *extra])
+
+
+def put_legend(ax: Axes, handles: Sequence[Line2D]) -> None:
+    """A legend over the axes, where it hides no line, in as many rows as it needs."""
+    width = ax.get_figure(root=True).get_figwidth() * ax.get_position().width  # type: ignore[union-attr]
+    needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
+    rows = math.ceil(needed / (_LETTERS * width))
+    ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=math.ceil(len(handles) / rows),
+        borderaxespad=0.3,
+        borderpad=0.0,
+        columnspacing=1.2,
+        handlelength=2.0,
+        fontsize=8.8,
+    )
