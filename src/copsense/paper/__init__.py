@@ -33,7 +33,7 @@ from copsense.paper.figures import (
 from copsense.paper.four_bar import FourBar
 from copsense.paper.icub_claims import ICUB_CLAIMS, evaluate_icub_claims
 from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
-from copsense.paper.lateral import LateralSweep
+from copsense.paper.lateral import LateralSweep, Series
 from copsense.paper.linkage import Hand
 from copsense.paper.printed import PRINTED_FORMS, PrintedForm
 
@@ -61,6 +61,7 @@ __all__ = [
     "ReferenceValue",
     "Sampling",
     "Segment",
+    "Series",
     "Verdict",
     "compare_with_reference",
     "evaluate_claims",

@@ -6,8 +6,6 @@ Figure where they need several. No window is opened and no figure is kept in a g
 
 from __future__ import annotations
 
-from matplotlib.figure import Figure
-
 from copsense.plots.cops import plot_cop, plot_foot_cop
 from copsense.plots.curves import (
     plot_load,
@@ -29,7 +27,6 @@ from copsense.plots.stance import plot_stance
 from copsense.plots.summary import plot_results
 
 __all__ = [
-    "Figure",
     "plot_cop",
     "plot_criteria_curves",
     "plot_figure_3",

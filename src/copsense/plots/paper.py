@@ -100,7 +100,7 @@ def plot_figure_9a(
     Args:
         wrench: Fig. 3a's data.
         torque: Fig. 3b's data.
-        reach: largest |angle| shown [rad].
+        reach: largest angle shown to either side [rad].
         ax: where to draw; default a new figure.
     """
     ax = axes_or_new(ax)

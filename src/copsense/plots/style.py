@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Figure  # for those who may not import matplotlib
 from matplotlib.lines import Line2D
 
 P = ParamSpec("P")

@@ -10,7 +10,6 @@ import xarray as xr
 
 from copsense.paper.lateral import TORQUE, WRENCH
 from copsense.plots import (
-    Figure,
     plot_cop,
     plot_criteria_curves,
     plot_figure_3,
@@ -23,6 +22,7 @@ from copsense.plots import (
     plot_torques,
     plot_unit_of_length,
 )
+from copsense.plots.style import Figure
 from copsense.reproduction import Reproduction
 
 _CEILING = 30.0  # mm/deg: Fig. 5 has a pole
@@ -196,8 +196,8 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "icub",
             "Fig. 8, iCub, minimum torque, CoM from foot to foot.",
             f"The loaded foot's CoP moves {own:.1f} mm from the centre to the end, the other's "
-            f"{far:.1f} mm, and it is this one that leaves its sole. Against Fig. 7: flatter about the "
-            "centre and on the loaded foot, steeper where a foot gives its load away.",
+            f"{far:.1f} mm, and it is this one that leaves its sole. Against Fig. 7: flatter about "
+            "the centre and on the loaded foot, steeper where a foot gives its load away.",
             "CoP y of both feet against CoM y: each flattens where its foot is loaded and steepens "
             "where it is not.",
             lambda: _figure(plot_cop(torque)),
