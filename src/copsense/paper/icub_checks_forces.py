@@ -97,7 +97,7 @@ def over_the_foot(sweep: LateralSweep) -> Finding:
         sweep.at(sweep.series[WRENCH].margin[:, k], 0.0) for k in (LEFT, RIGHT)
     )  # criterion 1's CoPs are at the origins there
     return Finding(
-        judge(best >= sweep.half, feasible > 0),
+        judge(sweep.reaches_foot(best), feasible > 0),
         best,
         "m",
         f"farthest the CoM goes with both CoPs in their soles: {reach[TORQUE] * 1e3:.1f} mm under "
@@ -110,13 +110,18 @@ def over_the_foot(sweep: LateralSweep) -> Finding:
 def full_period(sweep: LateralSweep) -> Finding:
     """The static part of what the experiment met; the amplitude is not printed."""
     first, second = sweep.planted(WRENCH), sweep.planted(TORQUE)
+    both = [name for name in (WRENCH, TORQUE) if sweep.reaches_foot(sweep.planted(name))]
+    kept = f"{' and '.join(both) or 'neither'} keeps"
     return Finding(
-        judge(first < sweep.half <= second, first < second),
+        judge(
+            sweep.reaches_foot(second) and not sweep.reaches_foot(first),
+            second > first * (1 + NEARLY),
+        ),
         second,
         "m",
-        f"amplitude up to which criterion 2 keeps both CoPs in the soles; criterion 1 up to "
+        "amplitude up to which criterion 2 keeps both CoPs in the soles; criterion 1 up to "
         f"{first * 1e3:.1f} mm. Condition: the amplitude, which is not printed, lies between the "
-        f"two; with the CoM over a foot, {sweep.half * 1e3:.0f} mm, neither keeps them there",
+        f"two; with the CoM over a foot, {sweep.half * 1e3:.0f} mm, {kept} them there",
     )
 
 

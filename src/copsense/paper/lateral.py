@@ -121,6 +121,10 @@ class LateralSweep:
         """A value of the loaded and of the unloaded foot with the CoM over the left foot."""
         return self.at(values[:, 0], self.half), self.at(values[:, 1], self.half)
 
+    def reaches_foot(self, travel: float) -> bool:
+        """Whether a travel of the CoM from the centre [m] brings it over a foot."""
+        return travel >= self.half - _SIDEWAYS
+
     def planted(self, criterion: str) -> float:
         """How far the CoM may go to either side with both CoPs in their soles [m]."""
         margin = self.series[criterion].margin.min(axis=1)
