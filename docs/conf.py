@@ -34,6 +34,8 @@ extensions = [
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+# The scraper below is a function, which the build cache cannot hold.
+suppress_warnings = ["config.cache"]
 exclude_patterns = ["gallery/**/*.ipynb"]
 
 default_role = "code"
@@ -48,16 +50,35 @@ python_use_unqualified_type_names = True
 
 # Types that are documented elsewhere: without the network there is nothing to link them to.
 ELSEWHERE = (
-    *("coal", "collections", "dataclasses", "jaxtyping", "matplotlib", "np", "numpy", "pandas"),
-    *("pathlib", "pin", "pinocchio", "scipy", "typing", "xarray"),
+    *("coal", "collections", "dataclasses", "fractions", "jaxtyping", "matplotlib", "np", "numpy"),
+    *("pandas", "pathlib", "pin", "pinocchio", "scipy", "typing", "xarray"),
 )
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
-    (r"py:.*", r"ArrayLike|TypeAliasForwardRef|ndarray|'[^']*'|tuple\[.*"),
+    (r"py:.*", r"ArrayLike|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
+    (r"py:class", r"copsense\.paper\.claim\.Subject"),  # a type variable
 ]
 
+
+def keep_figures(block: object, block_vars: dict, gallery_conf: dict) -> str:
+    """Save the figures that an example's block has made; the plots keep none in pyplot's state."""
+    from matplotlib.figure import Figure
+    from sphinx_gallery.scrapers import figure_rst
+
+    seen = block_vars.setdefault("seen_figures", [])
+    paths = []
+    for value in block_vars["example_globals"].values():
+        if isinstance(value, Figure) and not any(value is figure for figure in seen):
+            seen.append(value)
+            path = next(block_vars["image_path_iterator"])
+            value.savefig(path, dpi=120)
+            paths.append(path)
+    return figure_rst(paths, gallery_conf["src_dir"])
+
+
 sphinx_gallery_conf = {
+    "image_scrapers": (keep_figures,),
     "examples_dirs": str(HERE.parent / "examples"),
     "gallery_dirs": "gallery",
     # Every example runs at every build.
@@ -66,6 +87,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "remove_config_comments": True,
     "download_all_examples": False,
+    "reset_modules": (),
     "show_signature": False,
     "write_computation_times": False,
     "show_memory": False,

@@ -60,9 +60,7 @@ def cost(stance, criterion, forces):
     W = quadratic.torque
     if quadratic.inertia:
         W = W + quadratic.inertia * np.linalg.inv(stance.mass_matrix[6:, 6:])
-    return 0.5 * torques @ W @ torques + forces @ (
-        0.5 * quadratic.wrench @ forces - quadratic.pull
-    )
+    return 0.5 * torques @ W @ torques + forces @ (0.5 * quadratic.wrench @ forces - quadratic.pull)
 
 
 @pytest.mark.parametrize("name", CRITERIA)

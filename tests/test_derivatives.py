@@ -44,11 +44,7 @@ TIE_BREAKS = {
     "minimum wrench": copsense.minimum_wrench(0.3),
     "uneven wrench weights": copsense.Criterion(
         "uneven",
-        (
-            copsense.WrenchTerm(
-                random_spd(24, 7), reference=np.tile([0, 0, 90.0, 0, 0, 0], (4, 1))
-            ),
-        ),
+        (copsense.WrenchTerm(random_spd(24, 7), reference=np.tile([0, 0, 90.0, 0, 0, 0], (4, 1))),),
     ),
 }
 

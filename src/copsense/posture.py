@@ -48,7 +48,8 @@ class Posture:
     Attributes:
         stance: the stance at the posture.
         tangents: dq/d(request) (nv, r): one exact column per requested CoM coordinate, in the
-            order x, y, z, then one per requested joint; each satisfies J t = 0.
+            order x, y, z, then one per requested joint; each satisfies J t = 0, and is zero
+            where the contacts hold that coordinate fast.
         iterations: Newton iterations taken.
     """
 
@@ -141,6 +142,9 @@ def solve_posture(
             rate = np.zeros((len(K), requests))
             rate[len(K) - requests :] = np.eye(requests)
             tangents = _solve(K, rate)[: robot.model.nv]
+            # What the contacts hold fast has no tangent: least squares would move a contact.
+            missed = np.abs(C @ tangents - rate[len(K) - len(h) :]).max(axis=0, initial=0.0)
+            tangents[:, missed > 1e-6 * np.abs(tangents).max(axis=0, initial=1.0)] = 0.0
             return Posture(stance.at(here.q), tangents, iteration)
         step = _solve(K, -np.concatenate([stationarity, h]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))

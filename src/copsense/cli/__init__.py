@@ -42,7 +42,7 @@ def main() -> None:
     """Run the command line; an error of copsense is a line, not a traceback."""
     warnings.showwarning = _show_warning
     try:
-        code = copsense.main(standalone_mode=False) or 0
+        code = _run()
         sys.stdout.flush()
         sys.exit(code)
     except CopsenseError as error:
@@ -61,6 +61,13 @@ def main() -> None:
         # Standard output: files have errors of their own.
         click.echo(f"error: the answer could not be printed: {error}.", err=True)
     sys.exit(2)
+
+
+def _run() -> int:
+    try:
+        return copsense.main(standalone_mode=False) or 0
+    except SystemExit:
+        return 0  # click leaves so when whoever read our output has seen enough
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+
 import click
 from tqdm import tqdm
 
@@ -33,17 +36,21 @@ def reproduce(output: str, postures: int, force: bool, quiet: bool) -> None:
     from copsense.reproduction import reproduce as compute
 
     check_report_folder(output, overwrite=force)
-    with tqdm(
-        total=0, disable=quiet, leave=False, bar_format="{desc} {n}/{total} [{elapsed}]"
-    ) as bar:
+    command = f"copsense {shlex.join(sys.argv[1:])}"
+    form = "{desc} {n}/{total} [{elapsed}]"
+    # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
+    with tqdm(total=0, disable=quiet or None, leave=False, bar_format=form) as bar:
+        stages: list[str] = []
 
         def show(stage: str, done: int, total: int) -> None:
-            if bar.desc.strip() != stage:
-                click.echo(stage, err=True) if not quiet and bar.disable else None
-            bar.set_description_str(stage, refresh=False)
-            bar.total, bar.n = total, done
-            bar.refresh()
+            if stage not in stages:
+                stages.append(stage)
+                if bar.disable and not quiet:
+                    click.echo(f"{stage} ...", err=True)
+                bar.reset(total)
+                bar.set_description_str(stage, refresh=False)
+            bar.update(done - bar.n)
 
         result = compute(postures=postures, progress=show)
-        path = write_report(result, output, overwrite=force)
+        path = write_report(result, output, overwrite=force, command=command)
     click.echo(str(path))

@@ -335,7 +335,7 @@ def _law_forces(stance: Stance, law: WrenchLaw) -> np.ndarray:
 
 
 def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
-    """Whether velocities (nv,) or (nv, p) leave the contacts at rest: |J V| <= 1e-6 max(1, |V|)."""
+    """Whether velocities (nv,) or (nv, p) leave the contacts at rest, within 1e-6."""
     moved = np.abs(stance.jacobian @ directions).max(initial=0.0)
     return bool(moved <= 1e-6 * max(1.0, float(np.abs(directions).max(initial=0.0))))
 

@@ -31,6 +31,9 @@ from copsense.paper.figures import (
     figure_5,
 )
 from copsense.paper.four_bar import FourBar
+from copsense.paper.icub_claims import ICUB_CLAIMS, evaluate_icub_claims
+from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
+from copsense.paper.lateral import LateralSweep, Series
 from copsense.paper.linkage import Hand
 from copsense.paper.printed import PRINTED_FORMS, PrintedForm
 
@@ -38,6 +41,7 @@ __all__ = [
     "ERRATA",
     "FOUR_BAR_CLAIMS",
     "FOUR_BAR_CRITERIA",
+    "ICUB_CLAIMS",
     "PRINTED_FORMS",
     "CheckedClaim",
     "Claim",
@@ -52,13 +56,18 @@ __all__ = [
     "FourBarCriterion",
     "FourBarSolution",
     "Hand",
+    "LateralSweep",
     "PrintedForm",
+    "ReferenceValue",
     "Sampling",
     "Segment",
+    "Series",
     "Verdict",
+    "compare_with_reference",
     "evaluate_claims",
     "evaluate_errata",
     "evaluate_four_bar_claims",
+    "evaluate_icub_claims",
     "figure_3a",
     "figure_3b",
     "figure_4",

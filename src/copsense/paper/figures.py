@@ -94,7 +94,7 @@ class Sampling:
     ``FourBar()``.
 
     Attributes:
-        half_range: largest |Delta xi| [rad], below pi/2.
+        half_range: largest Delta xi to either side [rad], below pi/2.
         count: samples, two at least.
         least_load: a CoP is left out where its foot carries less than this part of m g.
     """

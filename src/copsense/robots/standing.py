@@ -10,6 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 import pinocchio as pin
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
@@ -56,7 +57,7 @@ def load_stance(
     *,
     contacts: Sequence[str | Contact] | None = None,
     posture: Mapping[str, float] | None = None,
-    base_rpy: Sequence[float] | None = None,
+    base_rpy: Sequence[float] | Float[np.ndarray, " 3"] | None = None,
     width: float | None = None,
     contact_at: ContactAt | None = None,
     package_dirs: Iterable[str | Path] = (),

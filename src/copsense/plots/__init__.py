@@ -1,0 +1,47 @@
+"""Figures of results; they draw and compute nothing.
+
+Functions take a sweep (or what `cop_sensitivity` or the paper's tables give) and return Axes, or a
+Figure where they need several. No window is opened and no figure is kept in a global state.
+"""
+
+from __future__ import annotations
+
+from copsense.plots.cops import plot_cop, plot_foot_cop
+from copsense.plots.curves import (
+    plot_load,
+    plot_margin,
+    plot_sensitivity,
+    plot_torques,
+    plot_travel,
+)
+from copsense.plots.paper import (
+    plot_criteria_curves,
+    plot_figure_3,
+    plot_figure_9a,
+    plot_figure_9b,
+    plot_unit_of_length,
+)
+from copsense.plots.saving import render_figure, save_figure
+from copsense.plots.soles import plot_soles
+from copsense.plots.stance import plot_stance
+from copsense.plots.summary import plot_results
+
+__all__ = [
+    "plot_cop",
+    "plot_criteria_curves",
+    "plot_figure_3",
+    "plot_figure_9a",
+    "plot_figure_9b",
+    "plot_foot_cop",
+    "plot_load",
+    "plot_margin",
+    "plot_results",
+    "plot_sensitivity",
+    "plot_soles",
+    "plot_stance",
+    "plot_torques",
+    "plot_travel",
+    "plot_unit_of_length",
+    "render_figure",
+    "save_figure",
+]

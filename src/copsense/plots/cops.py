@@ -1,0 +1,154 @@
+"""Where each CoP goes along a sweep, between the edges of its sole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from copsense.plots.marking import mark_failed, marks
+from copsense.plots.reading import (
+    MM,
+    abscissa,
+    contact_origins,
+    edges,
+    failed,
+    labels,
+    planted,
+    world_cops,
+)
+from copsense.plots.style import (
+    COM_LINE,
+    EDGE_LINE,
+    MUTED,
+    OFF_SOLE,
+    SOLE,
+    add_legend,
+    axes_or_new,
+    colours,
+    styled,
+)
+
+
+@styled
+def plot_cop(
+    dataset: xr.Dataset, *, axis: str = "y", ax: Axes | None = None, legend: bool = True
+) -> Axes:
+    """Draw where each CoP is in the world while the path is followed.
+
+    Each sole is a band between its two edges; the line is dotted where a CoP is off its sole or its
+    contact would have to pull. The CoM is drawn beside them.
+
+    Args:
+        dataset: a sweep.
+        axis: ``"x"`` or ``"y"`` of the world.
+        ax: where to draw; default a new figure.
+        legend: whether to say which colour is which criterion.
+    """
+    ax = axes_or_new(ax)
+    x, index = abscissa(dataset), "xy".index(axis)
+    names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
+    colour, cops, good = colours(names), world_cops(dataset)[..., index], planted(dataset)
+    pulling = dataset["pulling"].values.astype(bool)
+    _draw_edges(ax, dataset, axis, contacts)
+    com = dataset["com"].sel(com_axis=axis).values * MM
+    ax.plot(x.values, com, **COM_LINE)
+    for j, name in enumerate(names):
+        for k in range(len(contacts)):
+            line = cops[:, j, k]
+            for part in (pulling[:, j, k], ~pulling[:, j, k]):  # between them is a pole
+                shown = np.where(part, line, np.nan)
+                ax.plot(x.values, shown, color=colour[name], **OFF_SOLE)
+            ax.plot(
+                x.values,
+                np.where(good[:, j, k], line, np.nan),
+                color=colour[name],
+                **marks(dataset),
+            )
+    mark_failed(ax, dataset, colour)
+    _limit(ax, dataset, axis, cops, com)
+    ax.set_xlabel(x.label)
+    ax.set_ylabel(f"CoP {axis}, world [mm]")
+    if legend:
+        com_line = Line2D([], [], label="CoM", **COM_LINE)
+        off = Line2D([], [], color=MUTED, label="off its sole", **OFF_SOLE)
+        extra = [com_line] if np.all(good | failed(dataset)[..., None]) else [com_line, off]
+        add_legend(ax, colour, extra=extra)
+    return ax
+
+
+@styled
+def plot_foot_cop(
+    dataset: xr.Dataset,
+    contact: str,
+    *,
+    axis: str = "y",
+    against: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw one contact's CoP in its own axes, with the sole's edges as dotted lines.
+
+    Args:
+        dataset: a sweep.
+        contact: the contact's name.
+        axis: ``"x"`` or ``"y"`` of the contact.
+        against: a coordinate over postures to have along the horizontal axis; default the path's.
+        ax: where to draw; default a new figure.
+    """
+    ax = axes_or_new(ax)
+    x, names = abscissa(dataset, against), labels(dataset, "criterion")
+    colour, k = colours(names), labels(dataset, "contact").index(contact)
+    found = edges(dataset, axis)[k]
+    for edge in found or ():
+        place = edge - contact_origins(dataset)[k]["xy".index(axis)]
+        ax.axhline(place, **EDGE_LINE)
+    for name in names:
+        cop = dataset["cop"].sel(criterion=name, contact=contact, axis=axis).values * MM
+        ax.plot(x.values, cop, color=colour[name], **marks(dataset))
+    mark_failed(ax, dataset, colour, against)
+    ax.set_xlabel(x.label)
+    ax.set_ylabel(f"CoP {axis} of {contact} [mm]")
+    edge_line = Line2D([], [], label="edge of the sole", **EDGE_LINE)
+    add_legend(ax, colour, extra=[edge_line] if found else [])
+    return ax
+
+
+def _draw_edges(ax: Axes, dataset: xr.Dataset, axis: str, contacts: Sequence[str]) -> None:
+    """Each sole as a band between its edges; a contact without one as its name alone."""
+    at: dict[float, list[str]] = {}
+    for k, found in enumerate(edges(dataset, axis)):
+        if found is None:
+            middle = float(contact_origins(dataset)[k, "xy".index(axis)])
+        else:
+            ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
+            for edge in found:
+                ax.axhline(edge, color=MUTED, linewidth=1.0, zorder=0.6)
+            middle = found[0] + 3.0  # just inside the lower edge, where the curves seldom are
+        at.setdefault(round(middle, 1), []).append(contacts[k])
+    for middle, here in at.items():
+        ax.text(
+            0.012,
+            middle,
+            ", ".join(here),
+            transform=ax.get_yaxis_transform(),
+            color=MUTED,
+            fontsize=8.5,
+            va="bottom",
+            zorder=3,
+            bbox={"facecolor": "white", "alpha": 0.65, "linewidth": 0, "pad": 1.2},
+        )
+
+
+def _limit(ax: Axes, dataset: xr.Dataset, axis: str, cops: np.ndarray, com: np.ndarray) -> None:
+    """Keep a CoP that diverges from pressing everything else flat."""
+    bounds = [e for e in edges(dataset, axis) if e is not None]
+    places = contact_origins(dataset)[:, "xy".index(axis)]
+    marks = np.concatenate([np.ravel(bounds), places, com[np.isfinite(com)]])
+    span = max(float(np.ptp(marks)), 1.0)
+    shown = cops[np.isfinite(cops)]
+    inside = shown[(shown > marks.min() - span / 2) & (shown < marks.max() + span / 2)]
+    everything = np.concatenate([marks, inside])
+    ax.set_ylim(everything.min() - 0.05 * span, everything.max() + 0.05 * span)

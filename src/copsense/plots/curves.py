@@ -1,0 +1,164 @@
+"""Curves of a sweep against its coordinate: load, margin, travel, sensitivity, torques."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from copsense.plots.marking import mark_failed, marks, say, shade_below_zero
+from copsense.plots.reading import MM, abscissa, first_to_go, labels
+from copsense.plots.style import (
+    MUTED,
+    add_legend,
+    axes_or_new,
+    colours,
+    line_styles,
+    new_figure,
+    styled,
+)
+
+_TALL = 6.0  # how many times the least criterion's travel is shown
+
+
+@styled
+def plot_load(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw each contact's share of the weight, f_z / (m g)."""
+    ax = axes_or_new(ax)
+    share = dataset["wrench"].sel(component="fz").values / dataset.attrs["weight"]
+    _draw_per_contact(ax, dataset, share, legend=legend)
+    ax.axhline(0.0, color=MUTED, linewidth=0.8)
+    ax.set_ylabel("load share, $f_z/(m g)$")
+    return ax
+
+
+@styled
+def plot_margin(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw how far inside its sole each CoP is."""
+    ax = axes_or_new(ax)
+    margin = dataset["margin"].values * MM
+    _draw_per_contact(ax, dataset, np.where(np.isfinite(margin), margin, np.nan), legend=legend)
+    shade_below_zero(ax, margin, "off the sole")
+    if not np.any(np.isfinite(margin)):
+        say(ax, "no contact has a sole: none can tip")
+    ax.set_ylabel("CoP to nearest edge [mm]")
+    return ax
+
+
+@styled
+def plot_travel(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw how far the CoM may go before the first contact tips or unloads, to first order."""
+    ax = axes_or_new(ax)
+    x, names = abscissa(dataset), labels(dataset, "criterion")
+    colour, travel = colours(names), first_to_go(dataset)
+    for j, name in enumerate(names):
+        ax.plot(x.values, travel[:, j], color=colour[name], **marks(dataset))
+    mark_failed(ax, dataset, colour)
+    _keep_readable(ax, colour, travel)
+    shade_below_zero(ax, travel, "a contact tips or pulls")
+    if not np.any(np.isfinite(travel)):
+        say(ax, "no contact tips or unloads, to first order")
+    ax.set_xlabel(x.label)
+    ax.set_ylabel("CoM travel left [mm]")
+    if legend:
+        add_legend(ax, colour)
+    return ax
+
+
+@styled
+def plot_sensitivity(dataset: xr.Dataset, *, axis: str = "y") -> Figure:
+    """Draw the sensitivity: the CoP's slope along the path, and its gain per CoM travel."""
+    figure = new_figure(9.2, 3.7)
+    left, right = figure.subplots(1, 2)
+    unit = str(dataset[str(dataset.attrs["coordinate"])].attrs.get("units", "1"))
+    # m per unit of the path: of metres per metre nothing is left, m/rad read as mm/deg
+    scale = {"m": 1.0, "rad": MM * np.pi / 180.0}.get(unit, MM)
+    words = {"m": "m/m", "rad": "mm/deg"}.get(unit, "mm per posture")
+    slope = dataset["cop_slope"].sel(axis=axis).values * scale
+    gain = dataset["cop_gain"].sel(axis=axis, com_direction=axis).values
+    _draw_per_contact(left, dataset, slope, legend=True)
+    _draw_per_contact(right, dataset, gain, legend=True)
+    left.set_ylabel(f"slope of CoP {axis} along the path [{words}]")
+    right.set_ylabel(f"gain dCoP$_{axis}$/dCoM$_{axis}$ [m/m]")
+    return figure
+
+
+@styled
+def plot_torques(dataset: xr.Dataset) -> Figure:
+    """Draw the norm of the torques along the path, and the range of each joint's torque."""
+    names, joints = labels(dataset, "criterion"), labels(dataset, "joint")
+    figure = new_figure(9.2, max(3.4, 0.24 * len(joints) + 1.0))
+    left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
+    x, colour, torque = abscissa(dataset), colours(names), dataset["torque"].values
+    height = 0.8 / len(names)
+    for j, name in enumerate(names):
+        norm = np.linalg.norm(torque[:, j], axis=-1)
+        left.plot(x.values, norm, color=colour[name], **marks(dataset))
+        known = torque[:, j][np.all(np.isfinite(torque[:, j]), axis=-1)]
+        if len(known):
+            low, high = known.min(axis=0), known.max(axis=0)
+            rows = np.arange(len(joints)) + (j - (len(names) - 1) / 2) * height
+            # a torque that stands still is still seen
+            right.hlines(rows, low, high, color=colour[name], linewidth=160 * height / len(joints))
+            right.plot((low + high) / 2, rows, ".", color=colour[name], markersize=3)
+    mark_failed(left, dataset, colour)
+    right.axvline(0.0, color=MUTED, linewidth=0.8)
+    right.set_yticks(np.arange(len(joints)), joints, fontsize=8)
+    right.invert_yaxis()
+    right.set_xlabel("torque, least to most [N m]")
+    left.set_xlabel(x.label)
+    left.set_ylabel("norm of the joint torques [N m]")
+    left.set_ylim(bottom=0.0)
+    add_legend(left, colour)
+    return figure
+
+
+def _draw_per_contact(
+    ax: Axes,
+    dataset: xr.Dataset,
+    values: Float[np.ndarray, "N criterion contact"],
+    *,
+    legend: bool,
+) -> None:
+    """One line per criterion (colour) and contact (style)."""
+    x, names, contacts = abscissa(dataset), labels(dataset, "criterion"), labels(dataset, "contact")
+    colour, style = colours(names), line_styles(contacts)
+    for j, name in enumerate(names):
+        for k, contact in enumerate(contacts):
+            ax.plot(
+                x.values,
+                values[:, j, k],
+                color=colour[name],
+                linestyle=style[contact],
+                **marks(dataset),
+            )
+    mark_failed(ax, dataset, colour)
+    ax.set_xlabel(x.label)
+    if legend:
+        add_legend(ax, colour, style)
+
+
+def _keep_readable(
+    ax: Axes, colour: dict[str, str], travel: Float[np.ndarray, "N criterion"]
+) -> None:
+    """Cut a criterion that lets the CoM go very far, so that the others are seen; and say so."""
+    largest = {
+        n: np.max(t[np.isfinite(t)], initial=-np.inf) for n, t in zip(colour, travel.T, strict=True)
+    }
+    known = [value for value in largest.values() if value > 0]
+    if not known or max(known) <= _TALL * min(known):
+        return
+    top = _TALL * min(known)
+    ax.set_ylim(min(float(np.nanmin(travel)), 0.0) - 0.04 * top, top)
+    beyond = [name for name, value in largest.items() if value > top]
+    for row, name in enumerate(beyond):
+        ax.annotate(
+            f"↑ {name}: up to {largest[name] / MM:.3g} m",
+            (0.02, 0.97 - 0.07 * row),
+            xycoords="axes fraction",
+            va="top",
+            fontsize=8.5,
+            color=colour[name],
+        )

@@ -1,0 +1,120 @@
+"""Reading a sweep for drawing: units that read well, contact axes laid out in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Bool, Float
+
+MM, DEG = 1e3, 180.0 / np.pi
+_AXES = {"x": 0, "y": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class Abscissa:
+    """What a figure has along its horizontal axis.
+
+    Attributes:
+        values: in the unit of the label.
+        label: quantity and unit.
+    """
+
+    values: Float[np.ndarray, " N"]
+    label: str
+
+
+def abscissa(dataset: xr.Dataset, name: str | None = None) -> Abscissa:
+    """The path's coordinate, or another coordinate over postures, in mm or degrees."""
+    name = name or str(dataset.attrs["coordinate"])
+    variable = dataset[name]
+    values = np.asarray(variable.values, dtype=float)
+    title = {"com_y": "CoM y", "com_x": "CoM x", "index": "posture"}.get(name, name)
+    unit = str(variable.attrs.get("units", "1"))
+    if unit == "m":
+        return Abscissa(values * MM, f"{title} [mm]")
+    if unit == "rad":
+        return Abscissa(values * DEG, f"{title} [deg]")
+    return Abscissa(values, title if unit == "1" else f"{title} [{unit}]")
+
+
+def labels(dataset: xr.Dataset, dimension: str) -> list[str]:
+    """The names along a dimension."""
+    return [str(name) for name in np.atleast_1d(dataset[dimension].values)]
+
+
+def world_cops(dataset: xr.Dataset) -> Float[np.ndarray, "N criterion contact 2"]:
+    """Horizontal position of each CoP in the world [mm]."""
+    axes = dataset["contact_rotation"].values[:, :2, :2]
+    cops = np.einsum("kab,ijkb->ijka", axes, dataset["cop"].values)
+    return np.asarray((contact_origins(dataset) / MM + cops) * MM)
+
+
+def contact_origins(dataset: xr.Dataset) -> Float[np.ndarray, "contact 2"]:
+    """Horizontal position of each contact frame in the world [mm]."""
+    return np.asarray(dataset["contact_position"].values[:, :2] * MM)
+
+
+def world_soles(dataset: xr.Dataset) -> list[Float[np.ndarray, "k 2"] | None]:
+    """Outline of each sole in the world, seen from above [mm]; None for a contact without one."""
+    if "sole_polygon" not in dataset:
+        return [None] * dataset.sizes["contact"]
+    axes = dataset["contact_rotation"].values[:, :2, :2]
+    soles: list[np.ndarray | None] = []
+    for k, polygon in enumerate(dataset["sole_polygon"].values):
+        vertices = polygon[np.r_[True, np.any(np.diff(polygon, axis=0) != 0, axis=1)]]
+        soles.append(contact_origins(dataset)[k] + vertices @ axes[k].T * MM)
+    return soles
+
+
+def cross_section(
+    sole: Float[np.ndarray, "k 2"], axis: str, at: float
+) -> tuple[float, float] | None:
+    """Where a line along `axis`, the other coordinate being `at`, enters and leaves a sole.
+
+    These two are the edges that a CoP on that line can reach. None where the line misses it.
+    """
+    along = _AXES[axis]
+    across = 1 - along
+    reach = sole[:, across].min(), sole[:, across].max()
+    if reach[1] - reach[0] < 1e-9:  # a sole that is a line
+        return float(sole[:, along].min()), float(sole[:, along].max())
+    if not reach[0] <= at <= reach[1]:
+        return None
+    crossings = []
+    for a, b in zip(sole, np.roll(sole, -1, axis=0), strict=True):
+        low, high = sorted((a[across], b[across]))
+        if low <= at <= high and high > low:
+            part = (at - a[across]) / (b[across] - a[across])
+            crossings.append(a[along] + part * (b[along] - a[along]))
+    return float(min(crossings)), float(max(crossings))
+
+
+def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
+    """The two edges of each sole along an axis [mm], level with the middle of its CoPs."""
+    cops = world_cops(dataset)[..., 1 - _AXES[axis]]
+    found = []
+    for k, sole in enumerate(world_soles(dataset)):
+        here = cops[:, :, k]
+        known = here[np.isfinite(here)]
+        at = float(np.median(known)) if known.size else float(contact_origins(dataset)[k, 0])
+        found.append(None if sole is None else cross_section(sole, axis, at))
+    return found
+
+
+def planted(dataset: xr.Dataset) -> Bool[np.ndarray, "N criterion contact"]:
+    """Where a contact pushes and its CoP is on its sole."""
+    return np.asarray((dataset["margin"].values > 0) & ~dataset["pulling"].values.astype(bool))
+
+
+def first_to_go(dataset: xr.Dataset) -> Float[np.ndarray, "N criterion"]:
+    """First-order CoM travel to the first contact that tips or unloads [mm]; NaN if none does."""
+    both = np.minimum(dataset["com_travel"].values, dataset["unloading_travel"].values)
+    least = both.min(axis=2) * MM  # a failed row is NaN on every contact
+    return np.asarray(np.where(np.isfinite(least), least, np.nan))
+
+
+def failed(dataset: xr.Dataset) -> Bool[np.ndarray, "N criterion"]:
+    """Which rows have failed."""
+    return np.asarray(dataset["reason"].values != "")

@@ -1,0 +1,48 @@
+"""save_figure: a figure as a file, whole or not there."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from copsense.storage import check_output, write_beside
+
+SUFFIXES = (".png", ".svg", ".pdf")
+# No date in the file: the same figure is the same file.
+_UNDATED: dict[str, dict[str, None]] = {
+    ".svg": {"Date": None},
+    ".pdf": {"CreationDate": None},
+    ".png": {},
+}
+
+
+def save_figure(
+    figure: Figure, path: str | Path, *, overwrite: bool = False, dpi: float = 160.0
+) -> Path:
+    """Write a figure as PNG, SVG or PDF, by its suffix.
+
+    Args:
+        figure: what a plot function returned, or the ``figure`` of its axes.
+        path: where; its folder must exist.
+        overwrite: whether an existing file may be replaced.
+        dpi: dots per inch of a PNG.
+
+    Raises:
+        InvalidInputError: another suffix.
+        OutputError: the file exists, or cannot be written.
+    """
+    path = check_output(path, suffixes=SUFFIXES, overwrite=overwrite)
+    content = render_figure(figure, path.suffix, dpi=dpi)
+    write_beside(path, lambda temporary: temporary.write_bytes(content))
+    return path
+
+
+def render_figure(figure: Figure, suffix: str, *, dpi: float = 160.0) -> bytes:
+    """A figure as the content of a file with that suffix; the same figure gives the same bytes."""
+    content = BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "copsense", "svg.fonttype": "path"}):
+        figure.savefig(content, format=suffix[1:], dpi=dpi, metadata=_UNDATED[suffix])
+    return content.getvalue()

@@ -1,0 +1,167 @@
+"""plot_stance: one posture from above, and where its CoPs go when its CoM moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from copsense.criterion import Criterion
+from copsense.equilibrium import WrenchLaw
+from copsense.errors import InvalidInputError
+from copsense.plots.reading import MM
+from copsense.plots.soles import draw_ground, frame_ground
+from copsense.plots.style import INK, new_figure, styled
+from copsense.sensitivity import CopSensitivity
+from copsense.stance import Stance
+
+_STEP = 20.0  # mm that the CoM moves for the arrows
+_FORWARD, _LEFT = "#009E73", "#CC79A7"
+
+
+@styled
+def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figure:
+    """Draw a stance from above: soles, CoPs, CoM, and how the CoPs move when the CoM does.
+
+    From each CoP an arrow goes to where, to first order, it would be with the CoM 20 mm farther
+    forward, and one for 20 mm to the left. Beside each contact stand its share of the weight and
+    how far the CoM may move before the contact tips or unloads.
+
+    Args:
+        stance: the stance.
+        sensitivities: of that stance, one per criterion, at least one.
+
+    Raises:
+        InvalidInputError: no sensitivity, or one of another number of contacts.
+    """
+    if not sensitivities or any(len(s.cop) != len(stance.contacts) for s in sensitivities):
+        raise InvalidInputError(
+            "plot_stance needs sensitivities of the stance it draws, one per criterion: "
+            "[cop_sensitivity(stance, criterion), ...]."
+        )
+    places = stance.placements
+    origins = np.array([place.translation[:2] for place in places]) * MM
+    soles = [
+        None
+        if contact.polygon is None or contact.kind == "point"
+        else origins[k] + contact.polygon @ places[k].rotation[:2, :2].T * MM
+        for k, contact in enumerate(stance.contacts)
+    ]
+    com = stance.com[:2] * MM
+    figure = new_figure(max(4.1 * len(sensitivities), 5.0), 5.0)
+    panels = figure.subplots(1, len(sensitivities), sharey=True, squeeze=False)[0]
+    axes = [place.rotation[:2, :2] for place in places]
+    drawn = [_Drawn(s, origins, axes) for s in sensitivities]
+    reach = np.vstack([com, *[d.points() for d in drawn]])
+    for ax, result in zip(panels, drawn, strict=True):
+        draw_ground(ax, soles, origins)
+        _draw_arrows(ax, result)
+        ax.plot(com[1], com[0], "+", color=INK, markersize=13, markeredgewidth=2, zorder=6)
+        frame_ground(ax, soles, origins, reach)
+        _write_loads(ax, stance, result.result, soles, origins)
+        ax.set_title(_name(result.result.equilibrium.criterion))
+    for ax in panels[1:]:
+        ax.set_ylabel("")
+    figure.legend(handles=_handles(), loc="outside lower center", ncols=4)
+    return figure
+
+
+def _name(criterion: Criterion | WrenchLaw) -> str:
+    return criterion.name if isinstance(criterion, Criterion) else criterion.__name__
+
+
+class _Drawn:
+    """A sensitivity laid out in the world [mm]."""
+
+    def __init__(
+        self, result: CopSensitivity, origins: np.ndarray, axes: Sequence[np.ndarray]
+    ) -> None:
+        self.result = result
+        turned = [r @ p * MM for r, p in zip(axes, result.cop, strict=True)]
+        self.cops = origins + np.array(turned)
+        self.moves = np.array(
+            [r @ gain * _STEP for r, gain in zip(axes, result.com_gain, strict=True)]
+        )  # (nc, 2, 2): columns for the CoM forward and to the left
+
+    def points(self) -> np.ndarray:
+        """Where something is drawn."""
+        return np.vstack([self.cops, *(self.cops + self.moves[:, :, j] for j in (0, 1))])
+
+
+def _draw_arrows(ax: Axes, drawn: _Drawn) -> None:
+    for cop, moves in zip(drawn.cops, drawn.moves, strict=True):
+        for j, colour in enumerate((_FORWARD, _LEFT)):
+            tip = cop + moves[:, j]
+            if np.linalg.norm(moves[:, j]) > 0.5:  # mm: shorter is a dot with a head
+                ax.annotate(
+                    "",
+                    (tip[1], tip[0]),
+                    (cop[1], cop[0]),
+                    arrowprops={
+                        "arrowstyle": "-|>",
+                        "color": colour,
+                        "linewidth": 2.0,
+                        "shrinkA": 0,
+                        "shrinkB": 0,
+                        "mutation_scale": 13,
+                    },
+                    zorder=4,
+                )
+        ax.plot(cop[1], cop[0], "o", color=INK, markersize=6, zorder=5)
+
+
+def _write_loads(
+    ax: Axes,
+    stance: Stance,
+    result: CopSensitivity,
+    soles: Sequence[np.ndarray | None],
+    origins: np.ndarray,
+) -> None:
+    """Name, load and travel left of each contact, in front of it (behind it for a hind foot)."""
+    front = np.median(origins[:, 0])
+    for k, contact in enumerate(stance.contacts):
+        share = result.equilibrium.wrenches[k, 2] / stance.robot.weight
+        lines = [contact.name, f"{share:.0%} of the weight"]
+        for travel, event in (
+            (result.com_travel[k], "tips after"),
+            (result.unloading_travel[k], "unloads after"),
+        ):
+            if math.isfinite(travel) and not (event == "unloads after" and soles[k] is not None):
+                lines.append("is off its sole" if travel < 0 else f"{event} {travel * MM:.0f} mm")
+        sole, ahead = soles[k], origins[k, 0] >= front - 1.0
+        edge = origins[k, 0] if sole is None else sole[:, 0].max() if ahead else sole[:, 0].min()
+        middle = origins[k, 1] if sole is None else (sole[:, 1].min() + sole[:, 1].max()) / 2
+        ax.annotate(
+            "\n".join(lines),
+            (middle, edge),
+            xytext=(0, 9 if ahead else -9),
+            textcoords="offset points",
+            ha="center",
+            va="bottom" if ahead else "top",
+            fontsize=8.5,
+            color=INK,
+            linespacing=1.25,
+        )
+    # room for the words
+    low, high = ax.get_ylim()
+    behind = any(origin[0] < front - 1.0 for origin in origins)
+    ax.set_ylim(low - 0.22 * behind * (high - low), high + 0.22 * (high - low))
+    if all(sole is None for sole in soles):
+        left, right = ax.get_xlim()
+        ax.set_xlim(left + 0.3 * (left - right), right - 0.3 * (left - right))
+
+
+def _handles() -> list[Line2D]:
+    def arrow(colour: str, words: str) -> Line2D:
+        return Line2D([], [], color=colour, linewidth=2.0, marker=9, markersize=7, label=words)
+
+    return [
+        Line2D([], [], color=INK, marker="o", linestyle="none", label="CoP"),
+        Line2D([], [], color=INK, marker="+", markersize=11, linestyle="none", label="CoM"),
+        arrow(_FORWARD, f"CoP if the CoM goes {_STEP:.0f} mm forward"),
+        arrow(_LEFT, f"{_STEP:.0f} mm to the left"),
+    ]

@@ -1,0 +1,106 @@
+"""plot_results: a sweep in one figure."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from copsense.plots.cops import plot_cop
+from copsense.plots.curves import plot_load, plot_travel
+from copsense.plots.reading import (
+    MM,
+    abscissa,
+    contact_origins,
+    failed,
+    labels,
+    planted,
+    world_cops,
+    world_soles,
+)
+from copsense.plots.soles import draw_ground, draw_track, frame_ground
+from copsense.plots.style import (
+    COM_LINE,
+    MUTED,
+    OFF_SOLE,
+    colours,
+    line_styles,
+    new_figure,
+    styled,
+)
+
+_LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the legend's font
+
+
+@styled
+def plot_results(dataset: xr.Dataset) -> Figure:
+    """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel."""
+    figure = new_figure(9.0, 7.2)
+    ((above, cop), (load, travel)) = figure.subplots(2, 2)
+    _draw_above(above, dataset)
+    plot_cop(dataset, axis=widest_axis(dataset), ax=cop, legend=False)
+    plot_load(dataset, ax=load, legend=False)
+    plot_travel(dataset, ax=travel, legend=False)
+    above.set_title("where the CoPs go, from above")
+    cop.set_title("CoPs between the soles' edges")
+    load.set_title("who carries the weight")
+    travel.set_title("how far the CoM may still go")
+    coordinate = abscissa(dataset).label.partition(" [")[0]
+    count = dataset.sizes["posture"]
+    figure.suptitle(
+        f"{dataset.attrs['robot']}: {count} posture{'s' * (count != 1)} along {coordinate}",
+        x=0.01,
+        ha="left",
+        fontsize=12.5,
+        fontweight="bold",
+    )
+    handles = _handles(dataset)
+    needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
+    columns = math.ceil(len(handles) / math.ceil(needed / _LINE))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=9)
+    figure.get_layout_engine().set(w_pad=0.07, h_pad=0.07)  # type: ignore[union-attr,call-arg]
+    return figure
+
+
+def widest_axis(dataset: xr.Dataset) -> str:
+    """The world axis along which the CoM moves most."""
+    com = dataset["com"].values[:, :2]
+    known = com[np.all(np.isfinite(com), axis=1)]
+    if not len(known):
+        return "y"
+    across, along = np.ptp(known, axis=0)[::-1]
+    return "y" if across >= along else "x"
+
+
+def _draw_above(ax: Axes, dataset: xr.Dataset) -> None:
+    """Every criterion's tracks in one picture, the later ones thinner so that none hides."""
+    names, cops, good = labels(dataset, "criterion"), world_cops(dataset), planted(dataset)
+    colour, origins = colours(names), contact_origins(dataset)
+    pulling = dataset["pulling"].values.astype(bool)
+    draw_ground(ax, world_soles(dataset), origins)
+    for j, name in enumerate(names):
+        for k in range(dataset.sizes["contact"]):
+            width = max(5.5 - 2.8 * j, 1.2)
+            # a contact that pulls has no centre of pressure
+            track = np.where(pulling[:, j, k, None], np.nan, cops[:, j, k])
+            draw_track(ax, track, good[:, j, k], colour[name], width)
+    com = dataset["com"].values[:, :2] * MM
+    ax.plot(com[:, 1], com[:, 0], zorder=10, **COM_LINE)
+    frame_ground(ax, world_soles(dataset), origins, np.vstack([com, cops.reshape(-1, 2)]))
+
+
+def _handles(dataset: xr.Dataset) -> list[Line2D]:
+    names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
+    handles = [Line2D([], [], color=c, label=n) for n, c in colours(names).items()]
+    handles += [
+        Line2D([], [], color=MUTED, linestyle=style, label=f"load on {name}")
+        for name, style in line_styles(contacts).items()
+    ]
+    handles.append(Line2D([], [], label="CoM", **COM_LINE))
+    if not np.all(planted(dataset) | failed(dataset)[..., None]):
+        handles.append(Line2D([], [], color=MUTED, label="CoP off its sole", **OFF_SOLE))
+    return handles

@@ -1,0 +1,107 @@
+"""The real command in a process of its own: start-up, exit codes, signals, closed output."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ENTRY = "from copsense.cli import main; main()"
+COMMANDS = ("robots", "four-bar", "analyse", "sweep", "plot", "reproduce")
+
+
+def run(*arguments, code=ENTRY, **options):
+    options = {"capture_output": True, "text": True, "timeout": 120} | options
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    return subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)], env=environment, **options
+    )
+
+
+def test_help_of_every_command_shows_an_example_and_loads_no_robot_and_no_plots():
+    code = (
+        "import sys, io, contextlib\n"
+        "from copsense.cli import copsense\n"
+        "texts = {}\n"
+        f"for name in {COMMANDS!r}:\n"
+        "    out = io.StringIO()\n"
+        "    with contextlib.redirect_stdout(out):\n"
+        "        copsense.main([name, '--help'], standalone_mode=False)\n"
+        "    texts[name] = out.getvalue()\n"
+        "import json\n"
+        "heavy = {'matplotlib', 'jinja2', 'netCDF4', 'mujoco', 'icub_models'} & set(sys.modules)\n"
+        "print(json.dumps([texts, sorted(heavy)]))"
+    )
+    done = run(code=code)
+    assert done.returncode == 0, done.stderr
+    texts, heavy = json.loads(done.stdout)
+    assert heavy == []
+    for name, text in texts.items():
+        assert f"Example: copsense {name}" in " ".join(text.split()), name
+
+
+def test_the_installed_command_is_this_one():
+    script = Path(sys.executable).with_name("copsense")
+    if not script.exists():
+        pytest.skip("the command is not installed beside this interpreter")
+    done = subprocess.run([script, "--version"], capture_output=True, text=True)
+    assert done.stdout.startswith("copsense, version ")
+
+
+def test_exit_codes_are_0_done_1_some_rows_failed_2_bad_input():
+    assert run("four-bar").returncode == 0
+    some = run("sweep", "icub", "--com-y", "0:0.5:2")
+    assert (some.returncode, "failed: posture 1" in some.stderr) == (1, True)
+    bad = run("analyse", "icub", "--com-y", "0.5")
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.startswith("error: no posture of 'icub'")
+    assert "Traceback" not in bad.stderr
+
+
+def test_a_broken_urdf_is_one_line_without_a_parser_s_chatter(tmp_path):
+    path = tmp_path / "half.urdf"
+    path.write_text('<robot name="r"><link name="a"/><joint name="j" type="fixed"/></robot>')
+    done = run("analyse", path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+
+
+def test_ctrl_c_in_the_middle_of_a_sweep_leaves_no_file(tmp_path):
+    code = (
+        "import importlib, itertools, signal\n"
+        "module = importlib.import_module('copsense.sweep')\n"
+        "real, count = module.cop_sensitivity, itertools.count()\n"
+        "def interrupted(*args):\n"
+        "    if next(count) == 2: signal.raise_signal(signal.SIGINT)\n"
+        "    return real(*args)\n"
+        "module.cop_sensitivity = interrupted\n" + ENTRY
+    )
+    (tmp_path / "kept.nc").write_text("old")
+    output = ("--output", tmp_path / "kept.nc", "--force")
+    done = run("sweep", "four_bar", "--com-y", "0:0.01:5", *output, code=code)
+    assert done.returncode == 130, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "nothing half-written" in done.stderr
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("kept.nc", "old")]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_behind_the_answer_is_one_line():
+    with Path("/dev/full").open("w") as full:
+        done = run("four-bar", stdout=full, stderr=subprocess.PIPE, capture_output=False)
+    assert done.returncode == 2
+    assert "could not be printed" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = run("four-bar", stdout=writing, stderr=subprocess.PIPE, capture_output=False)
+    finally:
+        os.close(writing)
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr

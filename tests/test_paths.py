@@ -1,0 +1,122 @@
+"""Paths: on the constraint manifold, with the tangent of the very curve they sample."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from differences import largest_error
+
+import copsense
+from copsense.posture import contact_error
+
+MET = 1e-12  # m, rad
+
+
+def contacts_moved(path, stance):
+    return max(np.abs(contact_error(s, stance.placements)).max() for s in path.stances)
+
+
+def tangent_error(sweep_at, value, tangent, h=1e-3):
+    """Error of a tangent against differences of the path itself, solved at its neighbours."""
+    q = {k: sweep_at(value + k * h) for k in (-2, -1, 0, 1, 2)}
+    at = {k: pin.difference(q[0].robot.model, q[0].q, stance.q) for k, stance in q.items()}
+    numeric = (8 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12 * h)
+    return largest_error(tangent[:, None], numeric[:, None])
+
+
+def test_lateral_sweep_moves_the_com_alone(icub, lateral_path):
+    assert lateral_path.coordinate == "com_y"
+    assert lateral_path.unit == "m"
+    assert len(lateral_path) == 15
+    assert not lateral_path.failures
+    assert contacts_moved(lateral_path, icub) < MET
+    coms = np.array([stance.com for stance in lateral_path.stances])
+    np.testing.assert_allclose(coms[:, 1], np.linspace(-0.07, 0.07, 15), rtol=0, atol=MET)
+    feet = np.mean([place.translation[0] for place in icub.placements])
+    np.testing.assert_allclose(coms[:, 0], feet, rtol=0, atol=MET)
+    assert np.ptp(coms[:, 2]) > 1e-3  # the height is free, and takes its freedom
+
+
+@pytest.mark.parametrize("row", [0, 4, 7, 12])
+def test_lateral_tangent_is_the_derivative_of_the_path(icub, lateral_path, row):
+    stance, tangent = lateral_path.stances[row], lateral_path.tangents[row]
+
+    def at(y):
+        return copsense.lateral_sweep(icub, y, y, 1).stances[0]
+
+    assert tangent_error(at, lateral_path.values[row], tangent) < 1e-7
+    assert np.abs(stance.jacobian @ tangent).max() < 1e-12
+    np.testing.assert_allclose(stance.com_jacobian[:2] @ tangent, [0, 1], rtol=0, atol=1e-12)
+    rates = lateral_path.joint_rates("l_hip_roll")
+    assert rates[row] == tangent[stance.robot.velocity_index("l_hip_roll")]
+
+
+def test_a_posture_of_a_sweep_does_not_depend_on_the_others(icub, lateral_path):
+    # Each is nearest to the stance given, not to its neighbour on the way.
+    alone = copsense.lateral_sweep(icub, 0.07, 0.07, 1)
+    np.testing.assert_allclose(alone.stances[0].q, lateral_path.stances[-1].q, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(alone.tangents[0], lateral_path.tangents[-1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "start", "stop"),
+    [
+        ("icub", "l_knee", -0.5, -0.1),
+        ("icub", "torso_roll", -0.2, 0.2),
+        ("solo12", "FL_HFE", 0.6, 1),
+    ],
+)
+def test_joint_sweep_moves_the_joint_and_no_contact(stance_of, name, joint, start, stop):
+    stance = stance_of(name)
+    path = copsense.joint_sweep(stance, joint, start, stop, 5)
+    assert (path.coordinate, path.unit) == (joint, "rad")
+    assert not path.failures
+    assert contacts_moved(path, stance) < MET
+    angles = [s.robot.joint_position(s.q, joint) for s in path.stances]
+    np.testing.assert_allclose(angles, np.linspace(start, stop, 5), rtol=0, atol=MET)
+    np.testing.assert_allclose(path.joint_rates(joint), 1.0, rtol=0, atol=1e-12)
+
+    def at(angle):
+        return copsense.joint_sweep(stance, joint, angle, angle, 1).stances[0]
+
+    for row in (1, 4):
+        assert tangent_error(at, path.values[row], path.tangents[row]) < 1e-7
+
+
+def test_a_posture_out_of_reach_is_a_failure_and_the_others_stand(icub):
+    path = copsense.lateral_sweep(icub, -0.9, 0.9, 7)
+    assert sorted(path.failures) == [0, 1, 5, 6]
+    for i, reason in path.failures.items():
+        assert f"CoM y = {path.values[i]:g} m" in reason
+        assert not np.any(path.tangents[i])
+    assert [path.stances[i].com[1] for i in (2, 3, 4)] == pytest.approx([-0.3, 0, 0.3], abs=MET)
+
+
+def test_progress_is_told_of_each_posture_once(icub):
+    steps = []
+    copsense.lateral_sweep(icub, -0.02, 0.02, 4, progress=steps.append)
+    copsense.joint_sweep(icub, "l_knee", -0.3, -0.2, 3, progress=steps.append)
+    assert steps == [1] * 7
+
+
+def test_path_through_configurations_keeps_them_and_has_admissible_tangents(icub, lateral_path):
+    path = copsense.path_through(icub, [s.q for s in lateral_path.stances])
+    assert (path.coordinate, path.unit) == ("index", "1")
+    np.testing.assert_array_equal(path.values, np.arange(15))
+    spacing = 0.01  # m of CoM y between neighbours
+    for here, there, tangent, exact in zip(
+        path.stances, lateral_path.stances, path.tangents, lateral_path.tangents, strict=True
+    ):
+        np.testing.assert_allclose(here.q, there.q, rtol=0, atol=1e-15)
+        assert np.abs(here.jacobian @ tangent).max() < 1e-12
+        # As near to the curve's own tangent as the list is fine.
+        assert np.abs(tangent / spacing - exact).max() < 0.05 * np.abs(exact).max()
+
+
+def test_path_through_refuses_a_moved_contact_and_projects_on_request(icub, lateral_path):
+    moved = [q + 1e-4 * (np.arange(30) == 9) for q in (s.q for s in lateral_path.stances[:3])]
+    with pytest.raises(copsense.CopsenseError, match=r"configuration 0.*project=True"):
+        copsense.path_through(icub, moved)
+    path = copsense.path_through(icub, moved, project=True)
+    assert contacts_moved(path, icub) < MET
+    for here, given in zip(path.stances, moved, strict=True):
+        assert 0 < np.abs(pin.difference(icub.robot.model, given, here.q)).max() < 1e-3

@@ -1,0 +1,70 @@
+"""Every preset stands: feet on the ground, CoM over their middle, soles as their meshes show."""
+
+import numpy as np
+import pytest
+
+import copsense
+
+BIPEDS = {"icub", "talos", "romeo", "g1", "human"}
+
+
+@pytest.mark.parametrize("name", [name for name in copsense.PRESETS if name != "four_bar"])
+def test_preset_stands_on_level_ground_with_its_com_over_the_middle_of_its_feet(stance_of, name):
+    stance = stance_of(name)
+    origins = np.array([place.translation for place in stance.placements])
+    normals = np.array([place.rotation[:, 2] for place in stance.placements])
+    np.testing.assert_allclose(origins[:, 2], 0, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(normals, [[0, 0, 1]] * len(normals), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(origins.mean(axis=0), 0, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(stance.com[:2], 0, rtol=0, atol=1e-11)
+    assert stance.com[2] > 0.1
+    assert not copsense.solve_equilibrium(stance, copsense.minimum_torque()).pulling
+
+
+@pytest.mark.parametrize("name", [*sorted(BIPEDS), "iCubGenova04", "iCubLisboa01"])
+def test_bipeds_face_x_with_the_left_foot_at_y(stance_of, name):
+    stance = stance_of(name)
+    left, right = stance.placements
+    assert stance.contact_names[0].startswith("l")
+    assert left.translation[1] > 0.03 > -0.03 > right.translation[1]
+    for place, contact in zip(stance.placements, stance.contacts, strict=True):
+        assert place.rotation[0, 0] > 0.9
+        assert copsense.edge_margin(contact.polygon, (0.0, 0.0)).distance > 0.02
+
+
+def test_four_bar_stands_as_the_papers_at_a_right_angle(stance_of):
+    stance = stance_of("four_bar")
+    left, right = (place.translation for place in stance.placements)
+    np.testing.assert_allclose(left, [0, 0.07, 0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(right, [0, -0.07, 0], rtol=0, atol=1e-12)
+    # kappa l = 3/4 of 0.5 m
+    np.testing.assert_allclose(stance.com, [0, 0, 0.375], rtol=0, atol=1e-12)
+
+
+def test_icubs_sole_is_what_its_mesh_shows():
+    # Lowest millimetre of the collision mesh of iCubGenova04: 10.5 mm under the sole's frame.
+    robot = copsense.load_robot("icub")
+    sole = copsense.read_sole(robot, copsense.Contact("l_sole"))
+    assert sole.height == pytest.approx(-0.0105, abs=5e-5)
+    assert len(sole.polygon) == 74
+    low, high = sole.polygon.min(axis=0), sole.polygon.max(axis=0)
+    np.testing.assert_allclose(low, [-0.066, -0.0435], rtol=0, atol=5e-5)
+    np.testing.assert_allclose(high, [0.129, 0.0515], rtol=0, atol=5e-5)
+    # The right one is its mirror image.
+    other = copsense.read_sole(robot, copsense.Contact("r_sole")).polygon
+    np.testing.assert_allclose(other.min(axis=0)[1], -high[1], rtol=0, atol=1e-4)
+
+
+def test_icubs_frame_and_sole_contacts_differ_by_that_height(icub):
+    at_sole = copsense.load_stance("icub", contact_at="sole")
+    for contact in at_sole.contacts:
+        assert contact.offset[2] == pytest.approx(-0.0105, abs=5e-5)
+    assert at_sole.com[2] - icub.com[2] == pytest.approx(0.0105, abs=5e-5)
+
+
+def test_locked_joints_keep_their_mass(icub):
+    whole = copsense.load_robot("iCubGenova04")
+    assert len(whole.joint_names) == 32
+    assert len(icub.robot.joint_names) == 23
+    assert icub.robot.mass == pytest.approx(whole.mass, rel=1e-12)
+    assert icub.robot.model.nv == 29
