@@ -240,8 +240,8 @@ def _beyond(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "The sensitivity itself, iCub.",
             "Left: per metre of CoM travel along the sweep. Right: the gain, free of any choice of "
             "path or coordinate: metres of CoP per metre of CoM in the motion of least kinetic "
-            f"energy. Beyond ±{crossing:.1f} mm the unloading foot is the more sensitive one under "
-            "minimum torque.",
+            f"energy. Beyond ±{crossing:.1f} mm (left) the unloading foot is the more sensitive "
+            "one under minimum torque.",
             "Slope and gain of each foot's CoP against CoM y: constant near one for minimum "
             "wrench; between 0.1 and 2.5 for minimum torque.",
             lambda: plot_sensitivity(both),
