@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import linprog
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from copsense.contact import Contact, edge_side, half_planes
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -296,9 +296,19 @@ def _unit_cone(
         for x, y in polygon
         for t in angles
     ]
-    hull = ConvexHull(np.array(points))
-    equations = np.unique(np.round(hull.equations, 12), axis=0)
-    return tuple(np.insert(equation[:5], 2, equation[5]) for equation in equations)
+    # Each axis in its own size: friction may be small, and Qhull looks for flat directions.
+    size = np.abs(points).max(axis=0)
+    try:
+        hull = ConvexHull(np.array(points) / size)
+    except QhullError:
+        raise InvalidInputError(
+            f"the wrench cone of a sole so thin (friction {mu:g}) could not be computed. Use "
+            "friction, CoP and torsion rows."
+        ) from None
+    faces = np.unique(np.round(hull.equations, 12), axis=0)
+    faces[:, :5] /= size
+    faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
+    return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
 
 
 def _unit(component: int) -> Float[np.ndarray, " 6"]:

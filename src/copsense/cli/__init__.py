@@ -10,6 +10,7 @@ import warnings
 from typing import Any
 
 import click
+from threadpoolctl import threadpool_limits
 
 from copsense._version import __version__
 from copsense.cli.analyse import analyse
@@ -65,7 +66,9 @@ def main() -> None:
 
 def _run() -> int:
     try:
-        return copsense.main(standalone_mode=False) or 0
+        # The matrices are small: more BLAS threads than one cost more than they bring.
+        with threadpool_limits(limits=1, user_api="blas"):
+            return copsense.main(standalone_mode=False) or 0
     except SystemExit:
         return 0  # click leaves so when whoever read our output has seen enough
 
