@@ -57,7 +57,7 @@ class Score:
         parameters: its parameters.
         travel: smallest CoM travel from the path's middle to the first limit, either side [m].
         first_limit: the limit met there.
-        worst_gain: largest |dCoP/dCoM| of any contact at any posture within `range`.
+        worst_gain: largest norm of dCoP/dCoM of any contact at any posture within `range`.
         torque_norm: root mean square of the norm of the torques over these postures [N m].
         range: how far to either side of the middle gain and torques are taken [m].
     """
@@ -113,7 +113,7 @@ def design_criterion(
         limits: what ends the travel.
         family: the criteria to choose from, see `families`.
         objective: ``"travel"`` maximises the smallest travel to a limit; ``"gain"`` minimises the
-            largest |dCoP/dCoM| over the postures that both of the paper's criteria can hold.
+            largest norm of dCoP/dCoM over the postures that both of the paper's criteria can hold.
         grid: values per parameter.
         progress: called with 1 after each point of the grid.
 

@@ -34,7 +34,7 @@ class Limits:
             the contacts' own and leaves those without one unlimited; None switches friction off.
         friction_sides: sides of the pyramid inscribed in the friction cone, at least 3.
         cop_margin: how far inside the sole's edges the centre of pressure must stay [m].
-        torsion: torsional coefficient [m], |m_z about the CoP's contact| <= coefficient f_z;
+        torsion: torsional coefficient [m], ``|m_z| <= coefficient f_z``;
             ``"contact"`` takes the contacts' own; ``"cone"`` the exact wrench cone of the sole
             (moments that the sole's friction can carry, Caron et al. 2015), which contains the
             friction and centre-of-pressure limits too; None switches it off.
@@ -102,7 +102,7 @@ class LimitRows:
         names: what each row limits, such as ``"l_sole: CoP at the +y edge"``.
         contacts: index of the contact of each row (r,).
         kinds: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"`` or ``"wrench cone"``.
-        torque: limit of each joint's |torque| (n,) [Nm]; infinite where there is none.
+        torque: limit of the size of each joint's torque (n,) [Nm]; infinite where there is none.
     """
 
     matrix: Float[np.ndarray, "r m"]
@@ -143,7 +143,7 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
 
 
 def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
-    """|torque| limit of each joint [Nm], infinite where there is none."""
+    """Limit of the size of each joint's torque [Nm], infinite where there is none."""
     names = stance.robot.torque_names
     if limits is None:
         return np.full(len(names), np.inf)
@@ -296,19 +296,21 @@ def _unit_cone(
         for x, y in polygon
         for t in angles
     ]
-    # Each axis in its own size: friction may be small, and Qhull looks for flat directions.
-    size = np.abs(points).max(axis=0)
-    try:
-        hull = ConvexHull(np.array(points) / size)
-    except QhullError:
-        raise InvalidInputError(
-            f"the wrench cone of a sole so thin (friction {mu:g}) could not be computed. Use "
-            "friction, CoP and torsion rows."
-        ) from None
-    faces = np.unique(np.round(hull.equations, 12), axis=0)
-    faces[:, :5] /= size
-    faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
-    return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
+    array = np.array(points)
+    # Where Qhull takes little friction for a flat direction, each axis in its own size helps.
+    for size in (np.ones(5), np.abs(array).max(axis=0)):
+        try:
+            faces = np.unique(np.round(ConvexHull(array / size).equations, 12), axis=0)
+        except QhullError:
+            continue
+        faces[:, :5] /= size
+        faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
+        if (array @ faces[:, :5].T + faces[:, 5]).max() < _ROUNDING:
+            return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
+    raise InvalidInputError(
+        f"the wrench cone of so thin a sole (friction {mu:g}) could not be computed. Use friction, "
+        "CoP and torsion rows."
+    )
 
 
 def _unit(component: int) -> Float[np.ndarray, " 6"]:

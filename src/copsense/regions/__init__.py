@@ -11,7 +11,7 @@ All three hold the contacts' Jacobian J and the gravity torques G_j of the joint
 posture, as [Bretl2008] and [Orsolino2020] do, and move the weight's line of action alone:
 
     J_b' f = G_b(c) = G_b + S (c - c0),    S (c - c0) the moment of the weight moved by c - c0,
-    A f <= b,    |tau| <= t,    tau = G_j - J_j' f.
+    A f <= b,    -t <= tau <= t,    tau = G_j - J_j' f.
 
 That is exact for a load that shifts on the base's link. It is exact for every posture with these
 contacts where torques take no part: friction and soles alone, and the minimum wrench, know only

@@ -21,8 +21,9 @@ def gravity_at(stance: Stance, com: ArrayLike) -> Float[np.ndarray, " nv"]:
         com: (2,) world x, y [m] of the centre of mass.
 
     Returns:
-        G (nv,) [N, Nm]: the base's rows, in the base's frame, are those of the weight at `com`;
-        the joints' rows are the stance's. It equals ``stance.gravity`` at ``stance.com[:2]``.
+        The vector G (nv,) in N and Nm. The base's rows, in the base's frame, are those of the
+        weight at `com`; the joints' rows are the stance's. It equals ``stance.gravity`` at
+        ``stance.com[:2]``.
     """
     point = finite_array(com, "the centre of mass", (2,), "world x, y [m]")
     gravity = np.array(stance.gravity)

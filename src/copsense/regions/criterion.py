@@ -28,7 +28,8 @@ def criterion_region(
     The wrenches are those that the criterion chooses without limits: inside, a controller that
     uses it needs no QP to clip them; outside, it does, though an equilibrium may exist. At a held
     posture they are affine in c, f = f0 + F (c - c0), so the region is the intersection of the
-    half-planes A f <= b and |G_j - J_j' f| <= t, exact, and lies in `com_region` of these limits.
+    half-planes ``A f <= b`` and ``|G_j - J_j' f| <= t``, exact, and lies in `com_region` of these
+    limits.
 
     Args:
         stance: robot, posture and contacts.
