@@ -9,15 +9,8 @@ from copsense.equilibrium.constrained import (
     Rates,
     solve_constrained,
 )
-from copsense.equilibrium.static import (
-    PROJECT,
-    StaticEquilibrium,
-    WrenchLaw,
-    is_admissible,
-    law_name,
-    solve_static,
-    wrench_law,
-)
+from copsense.equilibrium.law import WrenchLaw, law_name, wrench_law
+from copsense.equilibrium.static import PROJECT, StaticEquilibrium, is_admissible, solve_static
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
 from copsense.stance import Stance
