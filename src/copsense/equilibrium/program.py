@@ -27,7 +27,8 @@ from copsense.errors import CopsenseError, UnsolvedError
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
-_ZERO = 1e-12  # norm of a row that limits nothing
+_ZERO = 1e-12  # norm of a row that limits nothing, relative size of an entry that is none
+_FAR = 1e4  # units: no x is looked for farther out
 _UNBOUNDED = 1e30  # as the solver writes infinity
 
 
@@ -256,13 +257,15 @@ class Program:
 
     def _conflict(self) -> tuple[float, np.ndarray]:
         """The least violation of all rows that leaves a point, and the rows that demand it."""
-        N = self.null
-        k = N.shape[1]
+        A, k = self.A @ self.null, self.null.shape[1]
+        # What rounding leaves of a zero must not become a way out, at 1e12 times the unit.
+        A[np.abs(A) < _ZERO * np.linalg.norm(self.A, axis=1, keepdims=True)] = 0.0
+        far = _FAR * self.unit
         found = scipy.optimize.linprog(
             np.eye(k + 1)[k],
-            A_ub=np.column_stack([self.A @ N, -np.ones(len(self.b))]),
+            A_ub=np.column_stack([A, -np.ones(len(self.b))]),
             b_ub=self.b - self.A @ self.start,
-            bounds=[(None, None)] * k + [(0, None)],
+            bounds=[(-far, far)] * k + [(0, None)],
         )
         if found.status != 0:
             return 0.0, np.zeros(0, dtype=int)
