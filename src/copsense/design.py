@@ -28,6 +28,7 @@ from copsense.stance import Stance
 
 Objective = Literal["travel", "gain"]
 _PARTS = ("hip", "knee", "ankle")
+_ROUNDING = 1e-9  # m
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
@@ -211,14 +212,15 @@ def score(
     rows, gains, norms = [], [], []
     for stance in path.stances:
         result = cop_sensitivity(stance, criterion)
-        rows.append(table.values(result.equilibrium.forces, result.equilibrium.torques))
+        # Slacks are nearer to straight lines than distances, whose f_z falls towards a limit.
+        rows.append(table.slack(result.equilibrium.forces, result.equilibrium.torques))
         gains.append(max(np.linalg.norm(gain, 2) for gain in result.com_gain))
         norms.append(float(np.sum(result.equilibrium.torques**2)))
     values, along = np.array(rows), path.values - path.values[middle]
     ends = [_first_zero(values, along, middle, side) for side in (1, -1)]
     travel, row = min(ends)
     reach = travel if within is None else within
-    taken = np.abs(along) <= max(reach, 1e-9)
+    taken = np.abs(along) <= reach + _ROUNDING  # a posture at the very end counts on either side
     reached = table.names[row] if row >= 0 else "none within the path"
     return Score(
         criterion.name,
@@ -288,7 +290,7 @@ def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
 def _first_zero(
     values: Float[np.ndarray, "N r"], along: Float[np.ndarray, " N"], middle: int, side: int
 ) -> tuple[float, int]:
-    """Travel at which a margin first reaches zero on one side, interpolated, and its row."""
+    """Travel at which a slack first reaches zero on one side, interpolated, and its row."""
     order = range(middle, len(along)) if side > 0 else range(middle, -1, -1)
     indices = list(order)
     if np.any(values[middle] < 0):

@@ -208,10 +208,17 @@ class MarginTable:
         self, forces: Float[np.ndarray, " m"], torques: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, " r"]:
         """Signed distance of each row [m, N or N m]."""
-        slack = self.contact_rows.bound - self.contact_rows.matrix @ forces
+        values = self.slack(forces, torques)
         # A CoP row is f_z (b - a p): its distance is that over f_z.
-        slack[self.is_cop] /= forces[self.row_fz[self.is_cop]]
-        return np.concatenate([slack, self.limit - self.sign * torques[self.joint]])
+        values[: len(self.is_cop)][self.is_cop] /= forces[self.row_fz[self.is_cop]]
+        return values
+
+    def slack(
+        self, forces: Float[np.ndarray, " m"], torques: Float[np.ndarray, " n"]
+    ) -> Float[np.ndarray, " r"]:
+        """The same as forces and moments, b - A f [N, N m], so linear in the forces."""
+        contact = self.contact_rows.bound - self.contact_rows.matrix @ forces
+        return np.concatenate([contact, self.limit - self.sign * torques[self.joint]])
 
     def rates(
         self,
