@@ -76,7 +76,7 @@ class _Problem:
         box = np.hstack([np.zeros((r, E.shape[1] - r)), np.eye(r)])
         full = np.vstack([np.hstack([rows, np.zeros((len(rows), r))]), box, -box])
         self.scale = np.maximum(np.linalg.norm(full, axis=1), _SHORTEST)
-        self.A = full @ self.N / self.scale[:, None]
+        self.A = np.ascontiguousarray(full @ self.N / self.scale[:, None])
         self.b = (np.append(bound / weight, np.full(2 * r, BOX)) - full @ self.x0) / self.scale
 
     def farthest(self, direction: Point) -> Point:
@@ -102,7 +102,7 @@ class _Problem:
         y, _, flag, info = daqp.solve(
             np.zeros((v, v)),
             cost,
-            np.ascontiguousarray(self.A),
+            self.A,
             self.b,
             np.full(k, -1e30),
             np.zeros(k, dtype=np.int32),

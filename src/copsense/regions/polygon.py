@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +13,7 @@ _ROUNDING = 1e-12  # m: how far beyond a line a corner may be and still be on it
 
 Point = Float[np.ndarray, " 2"]
 Points = Float[np.ndarray, "k 2"]
+Pair = Sequence[float]
 
 
 def refine(farthest: Callable[[Point], Point], tolerance: float) -> tuple[Points, Points]:
@@ -52,20 +54,19 @@ def _triangle(p: Point, n: Point, q: Point, m: Point) -> tuple[float, Point]:
     Returns:
         Its distance from the segment p q, and the point.
     """
-    edge = q - p
-    length = float(np.hypot(*edge))
-    if length == 0.0:
+    (px, py), (qx, qy), (nx, ny), (mx, my) = (v.tolist() for v in (p, q, n, m))
+    length = math.hypot(qx - px, qy - py)
+    # Sine of the third angle, at the lines' meeting: of the whole turn from n to m.
+    apex = nx * my - ny * mx
+    if length == 0.0 or apex <= 0.0:
         return 0.0, p
-    along = edge / length
+    ex, ey = (qx - px) / length, (qy - py) / length
     # Sines of the triangle's angles at p and q: of the turns from n to the edge's normal, to m.
-    a, b = max(float(-n @ along), 0.0), max(float(m @ along), 0.0)
-    apex = float(n[0] * m[1] - n[1] * m[0])
-    if apex <= 0.0:
-        return 0.0, p
-    outward = np.array([along[1], -along[0]])
+    a, b = max(-nx * ex - ny * ey, 0.0), max(mx * ex + my * ey, 0.0)
+    cosine = nx * ey - ny * ex  # of the angle at p; (ey, -ex) is the edge's outward normal
     from_p = length * b / apex
-    outer = p + from_p * (float(n @ outward) * along + a * outward)
-    return distance(outer, np.array([p, q])), outer
+    outer = (px + from_p * (cosine * ex + a * ey), py + from_p * (cosine * ey - a * ex))
+    return _segment_distance(outer, (px, py), (qx, qy)), np.array(outer)
 
 
 def clip(
@@ -85,18 +86,17 @@ def clip(
 
 def tidy(polygon: Points) -> Float[np.ndarray, "l 2"]:
     """The convex polygon without vertices that lie between their neighbours."""
-    corners, i, kept = list(polygon), 0, 0
+    corners, i, kept = polygon.tolist(), 0, 0
     while kept < len(corners) and len(corners) > 1:
         i %= len(corners)
         # Its neighbours; of two points each is the other's only one.
-        ends = np.array([corners[i - 1], corners[(i + 1) % len(corners)]])
-        if distance(corners[i], ends) <= MERGE:
+        if _segment_distance(corners[i], corners[i - 1], corners[(i + 1) % len(corners)]) <= MERGE:
             del corners[i]
             i, kept = max(i - 1, 0), 0
         else:
             i, kept = i + 1, kept + 1
     if len(corners) == 2:
-        corners.sort(key=np.sum)
+        corners.sort(key=sum)
     return np.array(corners).reshape(-1, 2)
 
 
@@ -107,3 +107,13 @@ def distance(point: Point, polygon: Points) -> float:
     lengths = np.maximum(np.sum(edges**2, axis=1), 1e-300)
     shares = np.clip(np.sum((point - polygon) * edges, axis=1) / lengths, 0.0, 1.0)
     return float(np.min(np.linalg.norm(polygon + shares[:, None] * edges - point, axis=1)))
+
+
+def _segment_distance(point: Pair, start: Pair, end: Pair) -> float:
+    """The same for one segment, in plain numbers."""
+    (x, y), (ax, ay), (bx, by) = point, start, end
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    share = ((x - ax) * dx + (y - ay) * dy) / square if square > 0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(ax + share * dx - x, ay + share * dy - y)
