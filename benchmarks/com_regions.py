@@ -252,8 +252,8 @@ The common stance is Solo 12 on four point feet, each on a slope of its own or a
 with its legs' mass in the trunk (jet-leg takes legs as weightless). Friction is an eight-sided
 pyramid, the same for all. "Off" is the Hausdorff distance to copsense's region at a tolerance of
 {1e3 * REFERENCE:g} mm, and for that reference itself its own guaranteed gap. The tools took turns,
-{ROUNDS} times each; "ratio" is of medians, to the first of copsense. copsense's time includes making the matrices, which pypoman is given ready
-made; jet-leg is given this robot's Jacobians and this pyramid in place of its own.
+{ROUNDS} times each; "ratio" is of medians, to the first of copsense. copsense's time
+includes making the matrices, which pypoman is given ready made; jet-leg is given this robot's Jacobians and this pyramid in place of its own.
 
 | stance and limits | tool | vertices | off [mm] | median [ms] | least [ms] | ratio |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |
