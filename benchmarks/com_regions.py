@@ -253,7 +253,8 @@ with its legs' mass in the trunk (jet-leg takes legs as weightless). Friction is
 pyramid, the same for all. "Off" is the Hausdorff distance to copsense's region at a tolerance of
 {1e3 * REFERENCE:g} mm, and for that reference itself its own guaranteed gap. The tools took turns,
 {ROUNDS} times each; "ratio" is of medians, to the first of copsense. copsense's time
-includes making the matrices, which pypoman is given ready made; jet-leg is given this robot's Jacobians and this pyramid in place of its own.
+includes making the matrices, which pypoman is given ready made; jet-leg is given this
+robot's Jacobians and this pyramid in place of its own.
 
 | stance and limits | tool | vertices | off [mm] | median [ms] | least [ms] | ratio |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |
