@@ -13,7 +13,7 @@ import pinocchio as pin
 import piqp
 import scipy.optimize
 import scipy.sparse
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,11 @@ def wrench_cone(polygon, mu, sides):
     points = generators(polygon, mu, sides)[:, [0, 1, 3, 4, 5]]
     middle = points.mean(axis=0)
     _, size, axes = np.linalg.svd(points - middle, full_matrices=False)
-    hull = ConvexHull((points - middle) @ axes.T / size)
+    scaled = (points - middle) @ axes.T / size
+    try:
+        hull = ConvexHull(scaled)
+    except QhullError:  # rounding alone decides which facets of so regular a section merge
+        hull = ConvexHull(scaled, qhull_options="Qx Q12")
     normals = hull.equations[:, :5] / size @ axes
     offsets = hull.equations[:, 5] - normals @ middle
     return np.insert(normals, 2, offsets, axis=1)
