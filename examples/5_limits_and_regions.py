@@ -19,7 +19,7 @@ limits = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torq
 
 for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
     travel = copsense.limit_travel(stance, criterion, limits)
-    found = copsense.first_binding(stance, criterion, limits)
+    found = copsense.next_change(stance, criterion, limits)
     print(
         f"{criterion.name}: {travel.first.margin.name} after {travel.first.exact * 1e3:.1f} mm "
         f"(first order {travel.first.first_order * 1e3:.1f}); "

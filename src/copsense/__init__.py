@@ -7,7 +7,7 @@ evaluates many, and a design chooses the criterion.
 """
 
 from copsense._version import __version__
-from copsense.binding import FirstBinding, first_binding
+from copsense.binding import LimitChange, next_change
 from copsense.contact import Contact, Plane, rectangle
 from copsense.cop import (
     EdgeMargin,
@@ -77,7 +77,7 @@ __all__ = [
     "Criterion",
     "Design",
     "EdgeMargin",
-    "FirstBinding",
+    "LimitChange",
     "Limits",
     "Path",
     "Plane",
@@ -103,7 +103,6 @@ __all__ = [
     "failed_rows",
     "families",
     "finite_difference_sensitivity",
-    "first_binding",
     "foot_rotation_indicator",
     "four_bar_angles",
     "four_bar_robot",
@@ -118,6 +117,7 @@ __all__ = [
     "minimum_torque",
     "minimum_wrench",
     "mixed",
+    "next_change",
     "path_through",
     "read_sole",
     "rectangle",

@@ -15,7 +15,7 @@ import xarray as xr
 from jaxtyping import Float
 
 from copsense._version import __version__
-from copsense.binding import FirstBinding, first_binding
+from copsense.binding import LimitChange, next_change
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
@@ -87,7 +87,7 @@ class WithinLimits:
 
     limits: Limits
     lateral: xr.Dataset
-    bindings: tuple[FirstBinding, ...]
+    bindings: tuple[LimitChange, ...]
     regions: Mapping[str, ComRegion]
 
 
@@ -254,7 +254,7 @@ def _within_limits(stance: Stance, path: Path, clock: _Clock) -> WithinLimits:
         bindings = []
         for criterion in criteria:
             for side in (-1, 1):
-                found = first_binding(stance, criterion, LIMITS, side)
+                found = next_change(stance, criterion, LIMITS, side)
                 if found:
                     bindings.append(found)
                 advance(1)

@@ -15,6 +15,7 @@ from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.equilibrium import (
     PROJECT,
+    ActiveSetChange,
     ConstrainedEquilibrium,
     StaticEquilibrium,
     WrenchLaw,
@@ -99,6 +100,37 @@ class CopSensitivity:
             wrenches = equilibrium.stance.unstack(forces)
             sides.append(sign * _cop_rate(equilibrium, self.cop, wrenches) / abs(rate))
         return sides[0], sides[1]
+
+    def active_set_changes(
+        self, tangent: ArrayLike
+    ) -> tuple[ActiveSetChange | None, ActiveSetChange | None]:
+        """The next limit to bind or to let go, back and forth along a path, to first order.
+
+        `copsense.next_change` finds the exact one on the lateral path.
+
+        Args:
+            tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6.
+
+        Returns:
+            The first change against the tangent and the first along it, their `travel` in metres
+            of horizontal CoM; None where nothing changes, as without limits.
+
+        Raises:
+            InvalidInputError: the motion moves a contact, or leaves the CoM over one point.
+        """
+        equilibrium = self.equilibrium
+        t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
+        if not is_admissible(equilibrium.stance, t):
+            raise InvalidInputError(f"the tangent moves a contact. {PROJECT}")
+        speed = float(np.linalg.norm(equilibrium.stance.com_jacobian[:2] @ t))
+        if not speed > _STILL * max(1.0, float(np.abs(t).max())):
+            raise InvalidInputError(
+                "the centre of mass stays over one point along this path: there is no travel to "
+                "measure by. Choose a path that moves it sideways."
+            )
+        if not isinstance(equilibrium, ConstrainedEquilibrium):
+            return None, None
+        return equilibrium.next_change(-t / speed), equilibrium.next_change(t / speed)
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint [m/rad] along a path with this tangent."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 from copsense.criterion import Criterion
 from copsense.equilibrium.constrained import (
     ActiveLimit,
+    ActiveSetChange,
     ConstrainedEquilibrium,
     Rates,
+    distance_to_change,
     solve_constrained,
 )
 from copsense.equilibrium.law import WrenchLaw, law_name, wrench_law
@@ -18,10 +20,12 @@ from copsense.stance import Stance
 __all__ = [
     "PROJECT",
     "ActiveLimit",
+    "ActiveSetChange",
     "ConstrainedEquilibrium",
     "Rates",
     "StaticEquilibrium",
     "WrenchLaw",
+    "distance_to_change",
     "is_admissible",
     "law_name",
     "solve_equilibrium",

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from copsense.criterion import Criterion, Quadratic
 from copsense.equilibrium.program import NoPointError, Program
@@ -40,6 +40,7 @@ from copsense.stance import Stance
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
 _RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
+_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that is no approach
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
 
 
@@ -62,6 +63,23 @@ class ActiveLimit:
     def weak(self) -> bool:
         """Whether the limit is only touched, so that the two sides differ."""
         return self.multiplier == 0.0
+
+
+@dataclass(frozen=True)
+class ActiveSetChange:
+    """The next limit to begin or cease to press along a motion, to first order.
+
+    Attributes:
+        name: the limit's name.
+        kind: as of `ActiveLimit`.
+        binds: whether it begins to bind; False where it lets go.
+        travel: how far along the motion, in units of it.
+    """
+
+    name: str
+    kind: str
+    binds: bool
+    travel: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +144,38 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         solved = self._problem.differentiate(self, directions, np.flatnonzero(self._problem.strong))
         return solved[0], solved[1]
 
+    def pressing_after(self, direction: Float[np.ndarray, " nv"]) -> Int[np.ndarray, " a"]:
+        """Rows that press once an admissible motion has begun."""
+        pushes = self._problem.weak & (self.rates(direction).multipliers > 0)
+        return np.flatnonzero(self._problem.strong | pushes)
+
     def rates(self, direction: Float[np.ndarray, " nv"]) -> Rates:
         """The one-sided derivative along an admissible motion: what happens when it begins."""
         return self._problem.rates(self, direction)
+
+    def next_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
+        """The first change of the pressing limits along an admissible motion, to first order.
+
+        The ratio test: a limit off its bound closes in at the rate of its slack (a centre of
+        pressure at that of its distance to the edge), a pressing one eases at the rate of its
+        multiplier. What is only touched here has taken a side already. None if nothing closes in.
+        """
+        rates = self.rates(direction)
+        strong, touching = self._problem.strong, self._problem.strong | self._problem.weak
+        slack, closing = self.slack, -rates.slack
+        # (s / f_z)' = (s' - (s / f_z) f_z') / f_z, here as the rate of s that has the same ratio.
+        normal = self._problem.normal
+        cop = np.flatnonzero(normal >= 0)
+        fz = normal[cop]
+        closing[cop] += slack[cop] * rates.forces[fz] / self.forces[fz]
+        left = np.where(touching, self.row_multipliers, slack)
+        closing = np.where(touching, -rates.multipliers, closing)
+        nearer = (closing > _CLOSING * np.abs(left)) & (strong | ~touching)
+        if not np.any(nearer):
+            return None
+        travel = np.where(nearer, left / np.where(nearer, closing, 1.0), np.inf)
+        i = int(np.argmin(travel))
+        return ActiveSetChange(self.names[i], self.kinds[i], not strong[i], float(travel[i]))
 
     @cached_property
     def _problem(self) -> _Problem:
@@ -170,6 +217,23 @@ def solve_constrained(
     return found
 
 
+def distance_to_change(
+    stance: Stance, criterion: Criterion, limits: Limits, pressing: Int[np.ndarray, " a"]
+) -> Float[np.ndarray, " r"]:
+    """How far each row is from changing sides if these rows press.
+
+    The slack of a row off its bound, in shares of the weight; the multiplier of one that presses,
+    in shares of the cost's gradient. These rows are the criterion's choice as long as none is
+    negative.
+    """
+    problem = _Problem(stance, criterion, limits)
+    optimum = problem.program.optimum(pressing)
+    distance = (problem.b - problem.A @ optimum.x) / (problem.weight * problem.scale)
+    gradient = max(float(np.abs(problem.H @ optimum.x - problem.g).max()), 1e-300)
+    distance[pressing] = (optimum.multipliers * problem.scale)[pressing] / gradient
+    return distance
+
+
 class _Problem:
     """The QP of a stance, a criterion and limits."""
 
@@ -187,6 +251,12 @@ class _Problem:
         # A contact's row has no joint, and no sign.
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
+        # Row of the normal force under a centre of pressure; -1 for any other limit.
+        under = [
+            stance.rows[k].start + stance.contacts[k].components.index(2) if kind == "cop" else -1
+            for k, kind in zip(rows.contacts, rows.kinds, strict=True)
+        ]
+        self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
         self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(rows.joint)
         self.weight = stance.robot.weight

@@ -9,7 +9,7 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
 
-from copsense.binding import FirstBinding
+from copsense.binding import LimitChange
 from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
 from copsense.report.figures import ReportFigure
 from copsense.report.typesetting import typeset
@@ -87,7 +87,7 @@ def number(value: float, unit: str = "1") -> str:
     return text if unit == "1" else f"{text} {unit}"
 
 
-def _binding(found: FirstBinding) -> dict[str, str]:
+def _binding(found: LimitChange) -> dict[str, str]:
     sides = {
         name: ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
         for name, side in (("before", found.before), ("after", found.after))
