@@ -31,6 +31,9 @@ DIMENSIONS = {
     "contact_position": ("contact", "com_axis"),
     "contact_rotation": ("contact", "com_axis", "contact_axis"),
     "sole_polygon": ("contact", "vertex", "axis"),
+    "friction": ("contact",),
+    "torsional_friction": ("contact",),
+    "torque_limit": ("joint",),
 }
 UNITS = {
     "cop": "m",
@@ -181,5 +184,6 @@ def test_contacts_without_a_sole_have_no_edge(icub):
     swept = copsense.sweep(copsense.path_through(stance, [stance.q]), [TORQUE])
     assert swept["margin"].sel(contact="hand").values == np.inf
     assert swept["margin_side"].sel(contact="hand").values == ""
-    assert "sole_polygon" not in swept
+    assert swept["sole_polygon"].sel(contact="hand").isnull().all()
+    assert swept["sole_polygon"].sel(contact="l_sole").notnull().all()
     assert swept.attrs["contact_kinds"] == "surface, surface, point"

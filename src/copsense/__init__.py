@@ -44,6 +44,7 @@ from copsense.limits import Limits
 from copsense.margins import limit_margins, limit_travel
 from copsense.motion import Path, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
+from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robot import Robot
 from copsense.robots import (
@@ -130,6 +131,7 @@ __all__ = [
     "sweep",
     "total_center_of_pressure",
     "weighted_torque",
+    "with_limit_margins",
     "wrench_law",
     "write_results",
     "zero_moment_point",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -13,7 +14,7 @@ from jaxtyping import Float
 from copsense.arrays import finite_number
 from copsense.criterion import Criterion
 from copsense.equilibrium import ConstrainedEquilibrium, distance_to_change
-from copsense.errors import CopsenseError, InvalidInputError
+from copsense.errors import CopsenseError, InvalidInputError, UnloadedContactError
 from copsense.limits import Limits
 from copsense.motion import lateral_posture
 from copsense.sensitivity import cop_sensitivity
@@ -36,7 +37,8 @@ class LimitChange:
         travel: how far the CoM has gone until then [m].
         first_order: the same, predicted where it set out [m]; infinite if no change was. It may be
             another limit's.
-        before: dCoP/dCoM_y of each contact just before the change (nc, 2), contact axes.
+        before: dCoP/dCoM_y of each contact just before the change (nc, 2), contact axes; None
+            where a contact carries no load there, and has no centre of pressure.
         after: the same just after.
     """
 
@@ -46,8 +48,8 @@ class LimitChange:
     com_y: float
     travel: float
     first_order: float
-    before: Float[np.ndarray, "nc 2"]
-    after: Float[np.ndarray, "nc 2"]
+    before: Float[np.ndarray, "nc 2"] | None
+    after: Float[np.ndarray, "nc 2"] | None
 
 
 def next_change(
@@ -108,9 +110,12 @@ def next_change(
     row, travel = found
     y = y0 + direction * travel
     here, there_tangent = lateral_posture(stance, y, near=walked[-1][1])
-    there = cop_sensitivity(here, criterion, limits)
-    # Along the direction of travel; turned back to world +y.
-    before, after = (direction * side for side in there.one_sided(direction * there_tangent))
+    before = after = None
+    # A contact that just unloads has no centre of pressure to speak of.
+    with suppress(UnloadedContactError):
+        there = cop_sensitivity(here, criterion, limits)
+        # Along the direction of travel; turned back to world +y.
+        before, after = (direction * side for side in there.one_sided(direction * there_tangent))
     return LimitChange(
         criterion.name,
         begin.equilibrium.names[row],

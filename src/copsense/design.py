@@ -19,7 +19,7 @@ from copsense.criterion import (
     weighted_torque,
 )
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
-from copsense.limits import Limits
+from copsense.limits import Limits, limit_rows
 from copsense.margins import MarginTable
 from copsense.motion import Path
 from copsense.posture import supporting_joints
@@ -180,7 +180,7 @@ def design_criterion(
         best,
         baselines,
         candidates,
-        _pareto(candidates, cost),
+        pareto(candidates, cost),
         objective,
         family.name,
     )
@@ -208,7 +208,8 @@ def score(
         CopsenseError: the criterion fails at a posture of the path.
     """
     middle = len(path) // 2
-    table = MarginTable(path.stances[middle], limits)
+    centre = path.stances[middle]
+    table = MarginTable(centre.contacts, limit_rows(centre, limits))
     rows, gains, norms = [], [], []
     for stance in path.stances:
         result = cop_sensitivity(stance, criterion)
@@ -304,7 +305,7 @@ def _first_zero(
     return float(abs(along[indices[-1]])), -1
 
 
-def _pareto(candidates: Sequence[Score], cost: Callable[[Score], float]) -> tuple[Score, ...]:
+def pareto(candidates: Sequence[Score], cost: Callable[[Score], float]) -> tuple[Score, ...]:
     """Candidates that no other beats in both cost and torque norm, by rising torque norm."""
     best, kept = np.inf, []
     for found in sorted(candidates, key=lambda s: (s.torque_norm, cost(s))):

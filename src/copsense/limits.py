@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -150,25 +150,38 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
             sole is too narrow for its margin.
         UnknownNameError: a torque limit names no joint.
     """
-    matrix, bound, names, contacts, kinds = [], [], [], [], []
-    m = len(stance.component_index)
-    for k, (contact, rows) in enumerate(zip(stance.contacts, stance.rows, strict=True)):
+    names = stance.robot.torque_names
+    return rows_of(stance.contacts, limits, torque_limits(stance, limits.torque), names)
+
+
+def rows_of(
+    contacts: Sequence[Contact],
+    limits: Limits,
+    torque: Float[np.ndarray, " n"],
+    joints: tuple[str, ...],
+) -> LimitRows:
+    """The same of contacts and joints' torque limits (n,) alone, forces stacked in their order."""
+    matrix, bound, names, owners, kinds = [], [], [], [], []
+    m = sum(len(contact.components) for contact in contacts)
+    start = 0
+    for k, contact in enumerate(contacts):
+        rows = slice(start, start := start + len(contact.components))
         for kind, name, normal, b in _contact_rows(contact, limits):
             row = np.zeros(m)
             row[rows] = normal[list(contact.components)]
             matrix.append(row)
             bound.append(b)
             names.append(f"{contact.name}: {name}")
-            contacts.append(k)
+            owners.append(k)
             kinds.append(kind)
     return LimitRows(
         np.array(matrix).reshape(-1, m),
         np.array(bound, dtype=float),
         tuple(names),
-        tuple(contacts),
+        tuple(owners),
         tuple(kinds),
-        torque_limits(stance, limits.torque),
-        stance.robot.torque_names,
+        torque,
+        joints,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,14 +10,16 @@ import numpy as np
 import scipy.optimize
 from jaxtyping import Float
 
+from copsense.contact import Contact
 from copsense.criterion import Criterion
 from copsense.equilibrium import StaticEquilibrium, solve_equilibrium
 from copsense.errors import CopsenseError, InvalidInputError
-from copsense.limits import Limits, limit_rows
+from copsense.limits import LimitRows, Limits, limit_rows
 from copsense.motion import lateral_posture
 from copsense.stance import Stance
 
-_UNITS = {"cop": "m", "torsion": "N m", "torque": "N m"}
+# Of a margin, by the limit's kind; "N" for the others.
+UNITS = {"cop": "m", "torsion": "N m", "torque": "N m"}
 _STILL = 1e-12  # rates under which a margin does not change
 _PRECISION = 1e-9  # of an exact travel [m]
 
@@ -79,7 +81,8 @@ class Travel:
 
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
-    table = MarginTable(equilibrium.stance, limits)
+    stance = equilibrium.stance
+    table = MarginTable(stance.contacts, limit_rows(stance, limits))
     values = table.values(equilibrium.forces, equilibrium.torques)
     return tuple(table.margin(rows, values) for rows in table.groups)
 
@@ -111,7 +114,7 @@ def limit_travel(
     """
     if direction not in (1, -1):
         raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    table = MarginTable(stance, limits)
+    table = MarginTable(stance.contacts, limit_rows(stance, limits))
     y0 = float(stance.com[1])
 
     def at(y: float, near: Stance) -> tuple[Stance, np.ndarray]:
@@ -177,15 +180,14 @@ class MarginTable:
         groups: indices of the rows of each contact or joint and kind.
     """
 
-    def __init__(self, stance: Stance, limits: Limits) -> None:
-        """Lay the rows out."""
-        rows = limit_rows(stance, limits)
-        self.contact_rows, self.fz = rows, _normal_rows(stance)
+    def __init__(self, contacts: Sequence[Contact], rows: LimitRows) -> None:
+        """Lay the rows of these contacts, from `limit_rows`, out."""
+        self.contact_rows, self.fz = rows, _normal_rows(contacts)
         self.joint, self.sign = rows.joint, rows.sign
         self.limit = rows.torque[self.joint]
         self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(self.joint)
-        self.where = tuple(stance.contact_names[k] for k in rows.contacts) + tuple(
+        self.where = tuple(contacts[k].name for k in rows.contacts) + tuple(
             rows.joints[i] for i in self.joint
         )
         self.is_cop = np.array([kind == "cop" for kind in rows.kinds], dtype=bool)
@@ -231,15 +233,13 @@ class MarginTable:
         i = int(rows[int(np.argmin(values[rows]))])
         kind = self.kinds[i]
         return LimitMargin(
-            self.names[i], self.where[i], kind, float(values[i]), _UNITS.get(kind, "N")
+            self.names[i], self.where[i], kind, float(values[i]), UNITS.get(kind, "N")
         )
 
 
-def _normal_rows(stance: Stance) -> np.ndarray:
+def _normal_rows(contacts: Sequence[Contact]) -> np.ndarray:
     """Row of the normal force of each contact in stacked forces."""
+    starts = np.cumsum([0, *(len(contact.components) for contact in contacts)])
     return np.array(
-        [
-            rows.start + contact.components.index(2)
-            for contact, rows in zip(stance.contacts, stance.rows, strict=True)
-        ]
+        [start + c.components.index(2) for c, start in zip(contacts, starts, strict=False)]
     )

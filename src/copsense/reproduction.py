@@ -17,6 +17,7 @@ from jaxtyping import Float
 from copsense._version import __version__
 from copsense.binding import LimitChange, next_change
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
+from copsense.equilibrium import solve_equilibrium
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
 from copsense.motion import Path, joint_sweep, lateral_sweep
@@ -38,6 +39,7 @@ from copsense.paper import (
 )
 from copsense.paper.lateral import HIP_ROLL, SHORT, TORQUE, WRENCH
 from copsense.posture import PostureCost
+from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robots import PRESETS, load_stance
 from copsense.sensitivity import cop_sensitivity
@@ -78,7 +80,7 @@ class WithinLimits:
     """What limits on the contacts and the motors change (Remark 4).
 
     Attributes:
-        limits: those of public balancing configurations for this robot.
+        limits: the limits; by default those of public balancing configurations for this robot.
         lateral: the lateral sweep with the wrenches solved within them, criteria 1 and 2.
         bindings: for each criterion and side, where the first limit binds and the slopes there.
         regions: name -> region of the CoM, the widest first: friction and soles alone, with the
@@ -145,30 +147,37 @@ class Reproduction:
         return LateralSweep.from_dataset(self.lateral, self.four_bar)
 
 
-def reproduce(*, postures: int = 141, progress: Progress | None = None) -> Reproduction:
+def reproduce(
+    *, postures: int = 141, limits: Limits = LIMITS, progress: Progress | None = None
+) -> Reproduction:
     """Compute the static half of [Romano2016] on the four-bar and on the iCub.
 
     Args:
         postures: of each lateral sweep of the iCub's CoM, from over one foot to over the other.
+        limits: of the section on limits; the rest of the paper knows none.
         progress: called as ``progress(stage, done, total)``.
 
     Raises:
-        InvalidInputError: fewer than 5 postures.
+        InvalidInputError: fewer than 5 postures, or no limit switched on.
+        InfeasibleError: no wrench respects the limits where the CoM is in the middle.
         MissingExtraError: the iCub models are not installed.
     """
     if postures < _LEAST:
         raise InvalidInputError(f"a reproduction needs {_LEAST} postures or more, got {postures}.")
-    clock = _Clock(progress)
+    if not limits.any:
+        raise InvalidInputError("the section on limits needs one. Switch one on.")
+    clock, stance = _Clock(progress), load_stance(_ROBOT)
+    for criterion in _paper_criteria():
+        solve_equilibrium(stance, criterion, limits)  # limits that forbid it are told at once
     with clock.stage("four-bar"):
         four_bar = FourBar()
         figures = tuple(f(four_bar) for f in (figure_3a, figure_3b, figure_4, figure_5))
         claims = evaluate_four_bar_claims(four_bar)
         errata = evaluate_errata(four_bar)
-    stance = load_stance(_ROBOT)
     lowered = load_stance(_ROBOT, contact_at="sole")
     lateral, path = _lateral(stance, postures, clock, "iCub")
     at_sole, _ = _lateral(lowered, postures, clock, "iCub, sole's bottom")
-    within = _within_limits(stance, path, clock)
+    within = _within_limits(stance, path, limits, clock)
     with clock.stage("unit of length"):
         unit = _unit_of_length(stance)
     with clock.stage("claims"):
@@ -227,11 +236,7 @@ def _lateral(stance: Stance, postures: int, clock: _Clock, name: str) -> tuple[x
     half = _distance(stance) / 2
     with clock.stage(f"{name}: postures", postures) as advance:
         path = lateral_sweep(stance, -half, half, postures, progress=advance)
-    criteria = [
-        minimum_wrench(_PAPER_LENGTH, name=WRENCH),
-        minimum_torque(name=TORQUE),
-        minimum_wrench(half, name=SHORT),
-    ]
+    criteria = [*_paper_criteria(), minimum_wrench(half, name=SHORT)]
     with clock.stage(f"{name}: sensitivities", postures) as advance:
         dataset = sweep(path, criteria, progress=advance)
     robot = stance.robot
@@ -246,26 +251,29 @@ def _lateral(stance: Stance, postures: int, clock: _Clock, name: str) -> tuple[x
     return told, path
 
 
-def _within_limits(stance: Stance, path: Path, clock: _Clock) -> WithinLimits:
-    criteria = [minimum_wrench(_PAPER_LENGTH, name=WRENCH), minimum_torque(name=TORQUE)]
+def _paper_criteria() -> list[Criterion]:
+    return [minimum_wrench(_PAPER_LENGTH, name=WRENCH), minimum_torque(name=TORQUE)]
+
+
+def _within_limits(stance: Stance, path: Path, limits: Limits, clock: _Clock) -> WithinLimits:
+    criteria = _paper_criteria()
     with clock.stage("limits: sensitivities", len(path)) as advance:
-        dataset = sweep(path, criteria, LIMITS, progress=advance)
+        dataset = with_limit_margins(sweep(path, criteria, limits, progress=advance), limits)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
         bindings = []
         for criterion in criteria:
             for side in (-1, 1):
-                found = next_change(stance, criterion, LIMITS, side)
+                found = next_change(stance, criterion, limits, side)
                 if found:
                     bindings.append(found)
                 advance(1)
-        regions = {
-            "friction and soles": com_region(stance, replace(LIMITS, torque=None)),
-            "and torque limits": com_region(stance, LIMITS),
-        }
+        regions = {"friction and soles": com_region(stance, replace(limits, torque=None))}
+        if limits.torque is not None:
+            regions["and torque limits"] = com_region(stance, limits)
         advance(2)
         for criterion in criteria:
-            regions[criterion.name] = criterion_region(stance, criterion, LIMITS)
-    return WithinLimits(LIMITS, dataset, tuple(bindings), regions)
+            regions[criterion.name] = criterion_region(stance, criterion, limits)
+    return WithinLimits(limits, dataset, tuple(bindings), regions)
 
 
 def _facts(stance: Stance, criterion: Criterion) -> dict[str, float]:

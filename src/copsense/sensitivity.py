@@ -30,6 +30,7 @@ from copsense.stance import Stance
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _STILL = 1e-12  # gains under which nothing moves
+_ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 
 
@@ -221,7 +222,7 @@ class CopSensitivity:
             moving = speeds > _STILL
             if np.any(moving):
                 travel[k] = np.min(margins[moving] / speeds[moving])
-            if np.any(margins[~moving] < 0):
+            if np.any(margins[~moving] < -_ON_EDGE):
                 travel[k] = -np.inf
         return travel
 

@@ -15,7 +15,7 @@ from copsense.cop import edge_margin
 from copsense.criterion import Criterion
 from copsense.equilibrium import ConstrainedEquilibrium, WrenchLaw, law_name
 from copsense.errors import CopsenseError, InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, torque_limits
 from copsense.motion import Path
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance
@@ -238,12 +238,29 @@ def _dataset(
         np.array([p.rotation for p in places]),
         {"units": "1", "long_name": "columns: contact axes in world axes"},
     )
-    polygons = [c.polygon for c in stance.contacts if c.polygon is not None]
-    if len(polygons) == len(stance.contacts):
+    for name, values_of_contacts, unit, meaning in (
+        ("friction", [c.friction for c in stance.contacts], "1", "Coulomb coefficient"),
+        ("torsional_friction", [c.torsional_friction for c in stance.contacts], "m", "torsional"),
+    ):
+        data[name] = (
+            "contact",
+            np.array(values_of_contacts, dtype=float),
+            {"units": unit, "long_name": f"{meaning} of the contact; NaN where it gives none"},
+        )
+    torque = torque_limits(stance, "model")
+    data["torque_limit"] = (
+        "joint",
+        np.where(np.isfinite(torque), torque, np.nan),
+        {"units": "N m", "long_name": "effort limit of the model; NaN where it has none"},
+    )
+    if any(c.polygon is not None for c in stance.contacts):
         data["sole_polygon"] = (
             ("contact", "vertex", "axis"),
-            _padded(polygons),
-            {"units": "m", "long_name": "vertices of the sole, contact axes, last one repeated"},
+            _padded([c.polygon for c in stance.contacts]),
+            {
+                "units": "m",
+                "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",
+            },
         )
     coordinates: dict[str, Any] = {
         "posture": np.arange(len(path)),
@@ -292,6 +309,7 @@ def _variable_name(name: str, taken: set[str]) -> str:
     return plain
 
 
-def _padded(polygons: list[np.ndarray]) -> np.ndarray:
-    longest = max(len(p) for p in polygons)
-    return np.array([np.vstack([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in polygons])
+def _padded(polygons: list[np.ndarray | None]) -> np.ndarray:
+    known = [np.full((1, 2), np.nan) if p is None else p for p in polygons]
+    longest = max(len(p) for p in known)
+    return np.array([np.vstack([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in known])

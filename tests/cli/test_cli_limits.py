@@ -27,6 +27,63 @@ def test_analyse_names_the_active_limits_where_they_press():
     assert row["contacts"]["r_sole"]["margin"] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_analyse_tells_the_next_change_of_the_active_limits_on_either_side():
+    arguments = ("analyse", "icub", "--com-y", "0.041", "--limits", LIMITS)
+    answer = copsense(*arguments, "--criterion", "minimum-wrench", "--json").json
+    change = answer["criteria"]["minimum-wrench"]["next_change"]
+    assert change["-y"]["exact"]["name"] == "r_sole: CoP at the +y (left) edge"
+    assert not change["-y"]["exact"]["binds"]
+    assert change["-y"]["exact"]["travel"] == pytest.approx(0.041 - 0.03838, abs=2e-5)
+    assert change["+y"]["exact"]["binds"]
+    for side in change.values():
+        assert side["first_order"]["travel"] == pytest.approx(side["exact"]["travel"], rel=0.02)
+    text = copsense(*arguments).out
+    assert "lets go (first order:" in text
+
+
+def test_analyse_draws_the_regions_that_limits_leave(tmp_path):
+    picture = tmp_path / "regions.png"
+    arguments = ("analyse", "icub", "--limits", LIMITS, "--regions", picture)
+    answer = copsense(*arguments, "--json").json["regions"]
+    areas = [row["area"] for row in answer["of"].values()]
+    assert list(answer["of"])[:2] == ["friction and soles", "and torque limits"]
+    assert areas == sorted(areas, reverse=True)
+    assert picture.stat().st_size > 10_000
+    assert "cm2, the CoM" in copsense(*arguments, "--force").out
+    assert "exists already" in copsense(*arguments).error
+    without = copsense("analyse", "icub", "--regions", tmp_path / "x.png")
+    assert "Give --limits too" in without.error
+
+
+def test_a_quadruped_whose_foot_unloads_is_analysed_all_the_same(tmp_path):
+    answer = copsense("analyse", "solo12", "--limits", "friction=0.5,torque=model", "--json").json
+    change = answer["criteria"]["minimum-torque"]["next_change"]["+y"]["exact"]
+    assert change["binds"]
+
+
+def test_a_plot_takes_limits_the_sweep_knew_nothing_of(tmp_path):
+    file, picture = tmp_path / "free.nc", tmp_path / "free.png"
+    sweep = ("sweep", "icub", "--com-y", "-0.07:0.07:9", "--output", file)
+    assert copsense(*sweep).code == 0
+    assert copsense("plot", file).code == 0
+    plain = picture.read_bytes()
+    answer = copsense("plot", file, "--limits", LIMITS, "--force")
+    assert answer.code == 0
+    assert picture.read_bytes() != plain
+    assert "non-negative" in copsense("plot", file, "--limits", "friction=-1", "--force").error
+
+
+def test_a_reproduction_takes_limits_and_refuses_impossible_ones_at_once(tmp_path):
+    folder = tmp_path / "report"
+    arguments = ("reproduce", "--postures", "21", "--output", folder, "--quiet")
+    assert "In conflict" in copsense(*arguments, "--limits", "normal-force=200").error
+    assert not folder.exists()
+    assert copsense(*arguments, "--limits", "friction=0.2,cop-margin=0.01,torque=30").code == 0
+    page = (folder / "report.html").read_text()
+    assert "CoP inside the sole by 10 mm, torques of 30 N m at most" in page
+    assert "--limits friction=0.2,cop-margin=0.01,torque=30" in page
+
+
 def test_a_sweep_within_limits_keeps_every_cop_on_its_sole(tmp_path):
     file = tmp_path / "within.nc"
     answer = copsense(
@@ -37,6 +94,8 @@ def test_a_sweep_within_limits_keeps_every_cop_on_its_sole(tmp_path):
         assert float(data["margin"].min()) > -1e-9
         ends = data["active_limits"].isel(posture=[0, -1]).values
         assert all("CoP at the" in name for name in ends.ravel())
+        assert float(data["limit_margin"].min()) > -1e-6
+        assert float(data["limit_margin"].sel(limit="r_sole: cop").isel(posture=-1).max()) < 1e-9
         assert data["active_limits"].isel(posture=4).values.tolist() == ["", ""]
 
 
@@ -61,7 +120,7 @@ def test_bad_limits_are_one_error(limits, said):
     assert said in copsense("analyse", "icub", "--limits", limits).error
 
 
-def test_design_beats_the_papers_two_criteria_and_says_by_how_much():
+def test_design_beats_the_papers_two_criteria_and_says_by_how_much(tmp_path):
     arguments = ("--com-y", "-0.08:0.08:17", "--grid", "4", "--limits", LIMITS)
     answer = copsense("design", "icub", "--family", "length", *arguments, "--json").json
     best, baselines = answer["best"], answer["baselines"]
@@ -71,7 +130,9 @@ def test_design_beats_the_papers_two_criteria_and_says_by_how_much():
     travels = [row["travel"] for row in answer["pareto"]]
     assert norms == sorted(norms)
     assert travels == sorted(travels)
-    text = copsense("design", "icub", "--family", "length", *arguments).out
+    picture = tmp_path / "design.svg"
+    text = copsense("design", "icub", "--family", "length", *arguments, "--plot", picture).out
+    assert picture.stat().st_size > 10_000
     assert "over the better of the paper's two" in text
 
 

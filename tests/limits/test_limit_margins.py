@@ -8,7 +8,7 @@ from random_cases import random_stance
 
 import copsense
 from copsense.cop import contact_cops
-from copsense.limits import Limits, torque_limits
+from copsense.limits import Limits, limit_rows, torque_limits
 from copsense.margins import MarginTable, limit_margins
 
 
@@ -115,7 +115,7 @@ def test_rates_are_the_derivatives_of_the_margins(stance_of):
     rng = np.random.default_rng(9)
     stance = random_stance(stance_of("icub"), rng)
     limits = replace(Limits(), torque=20.0, friction_sides=4)
-    table = MarginTable(stance, limits)
+    table = MarginTable(stance.contacts, limit_rows(stance, limits))
 
     def values(at):
         found = copsense.solve_equilibrium(at, copsense.minimum_torque())

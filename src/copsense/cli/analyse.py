@@ -7,6 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.limits import (
+    add_limits,
+    add_regions,
+    limit_verdict,
+    print_limits,
+    print_regions,
+)
 from copsense.cli.options import (
     criterion_options,
     echo_json,
@@ -16,16 +23,16 @@ from copsense.cli.options import (
     read_stance,
     stance_options,
 )
+from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from copsense.criterion import Criterion
-    from copsense.limits import Limits
     from copsense.sensitivity import CopSensitivity
     from copsense.stance import Stance
 
 
 @click.command(
-    epilog="Example: copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png"
+    epilog="Examples: copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png; "
+    "copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
 )
 @stance_options
 @criterion_options
@@ -41,7 +48,13 @@ if TYPE_CHECKING:
 )
 @click.option("--check", is_flag=True, help="Audit the derivatives against finite differences.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw the stance: .png, .svg or .pdf.")
-@click.option("--force", is_flag=True, help="Overwrite the picture.")
+@click.option(
+    "--regions",
+    type=click.Path(),
+    help="Draw the regions of the CoM that the limits leave, and tell their areas: .png, .svg or "
+    ".pdf. Needs --limits.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the pictures.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def analyse(
     robot: str,
@@ -54,6 +67,7 @@ def analyse(
     along: str | None,
     check: bool,
     picture: str | None,
+    regions: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -68,8 +82,14 @@ def analyse(
     from copsense.sensitivity import check_sensitivity, cop_sensitivity
     from copsense.storage import check_output
 
-    if picture is not None:
-        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    for drawn in filter(None, (picture, regions)):
+        check_output(drawn, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    within = read_limits(limits)
+    if regions is not None and (within is None or not within.any):
+        raise InvalidInputError(
+            "regions of the CoM are those that limits leave. Give --limits too, such as "
+            "--limits friction=0.33,torque=model."
+        )
     chosen = read_criteria(criteria, characteristic_length)
     held = {joint: math.radians(deg) for joint, deg in read_assignments(joints).items()}
     home = read_stance(robot, **options)
@@ -80,14 +100,16 @@ def analyse(
     y = com_y if com_y is not None else float(home.com[1])
     posture = solve_posture(home, com=(x, y, None), joints=held)
     stance, tangent = posture.stance, posture.tangents[:, 0 if planar else 1]
-    within = read_limits(limits)
     results = {c.name: cop_sensitivity(stance, c, within) for c in chosen}
     if check:
         for criterion in chosen:
             check_sensitivity(stance, criterion, within)
     answer = _answer(stance, results, tangent, along)
-    if within is not None:
-        _add_limits(answer, stance, chosen, results, within)
+    if within is not None and within.any:
+        add_limits(answer, stance, chosen, results, within, tangent)
+    if regions is not None:
+        assert within is not None
+        add_regions(answer, stance, chosen, within, regions, overwrite=force)
     answer.setdefault("notes", []).extend(sole_notes(stance))
     answer["notes"] += [
         f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
@@ -159,87 +181,6 @@ def _answer(
     }
 
 
-def _add_limits(
-    answer: dict[str, Any],
-    stance: Stance,
-    criteria: list[Criterion],
-    results: dict[str, CopSensitivity],
-    limits: Limits,
-) -> None:
-    """Active limits, margins, and the CoM's travel to each limit on both sides."""
-    from dataclasses import asdict
-
-    from copsense.equilibrium import ConstrainedEquilibrium
-    from copsense.limits import torque_placeholders
-    from copsense.margins import limit_margins, limit_travel
-
-    if limits.torque == "model" and torque_placeholders(stance):
-        answer.setdefault("notes", []).append(
-            "no torque limit in the model (a placeholder) for: "
-            + ", ".join(torque_placeholders(stance))
-        )
-    for criterion in criteria:
-        row, equilibrium = answer["criteria"][criterion.name], results[criterion.name].equilibrium
-        assert isinstance(equilibrium, ConstrainedEquilibrium)
-        row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
-        row["optimality"] = equilibrium.optimality()
-        row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
-        row["limit_travel"] = {
-            f"{'+' if side > 0 else '-'}y": [
-                {
-                    "name": t.margin.name,
-                    "margin": t.margin.value,
-                    "unit": t.margin.unit,
-                    "first_order": t.first_order,
-                    "exact": t.exact,
-                }
-                for t in limit_travel(stance, criterion, limits, side).limits
-            ]
-            for side in (1, -1)
-        }
-
-
-def _limit_verdict(answer: dict[str, Any]) -> str:
-    """The same of the first limit met to either side, found along the path."""
-    reach = {
-        name: min(
-            (math.inf if t["exact"] is None else t["exact"], t["name"])
-            for travels in row["limit_travel"].values()
-            for t in travels
-        )
-        for name, row in answer["criteria"].items()
-    }
-    best = max(reach, key=lambda name: reach[name][0])
-    distance, limit = reach[best]
-    if distance == 0:
-        return "Every criterion meets a limit here already."
-    if not math.isfinite(distance):
-        return f"{best} meets no limit within reach."
-    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n != best)
-    return (
-        f"{best} is the last to meet a limit: the CoM may move {distance * 1e3:.1f} mm until "
-        f"{limit}" + (f" ({others})." if others else ".")
-    )
-
-
-def _print_limits(row: dict[str, Any]) -> None:
-    names = "; ".join(
-        limit["name"] + ("" if limit["multiplier"] else " (touched)")
-        for limit in row["active_limits"]
-    )
-    click.echo(f"  active limits: {names or 'none'}")
-    for side, travels in row["limit_travel"].items():
-        for travel in travels[:3]:
-            if travel["exact"] is None:
-                continue
-            first = travel["first_order"]
-            predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
-            click.echo(
-                f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
-                f"(first order: {predicted})"
-            )
-
-
 def _print(answer: dict[str, Any], along: str | None) -> None:
     com = ", ".join(f"{round(value, 4) + 0.0:+.4f}" for value in answer["com"])
     click.echo(f"{answer['robot']}: {answer['mass']:.2f} kg, CoM ({com}) m, world axes")
@@ -272,12 +213,14 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
                 line += f"  {c[f'cop_per_{along}'][1] * 1e3 * math.pi / 180:12.3f}"
             click.echo(line + ("  PULLING" if c["pulling"] else ""))
         if "limit_travel" in row:
-            _print_limits(row)
+            print_limits(row)
     click.echo("\n" + _verdict(answer))
     for note in answer["notes"]:
         click.echo(f"note: {note}", err=True)
     if answer["checked"]:
         click.echo("derivatives agree with finite differences to 1e-7 relative")
+    if "regions" in answer:
+        print_regions(answer["regions"])
     if "plot" in answer:
         click.echo(f"drawn: {answer['plot']}")
 
@@ -285,7 +228,7 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
 def _verdict(answer: dict[str, Any]) -> str:
     """One sentence: which criterion lets the CoM travel farthest before a contact tips."""
     if all("limit_travel" in row for row in answer["criteria"].values()):
-        return _limit_verdict(answer)
+        return limit_verdict(answer)
     reach = {
         name: min(
             (c[key], f"{contact} {word}")

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 
 @click.command(
-    epilog="Example: copsense design icub --family joints --limits friction=0.33,torque=model"
+    epilog="Example: copsense design icub --family joints --limits friction=0.33,torque=model "
+    "--plot design.png"
 )
 @stance_options
 @click.option(
@@ -50,6 +51,13 @@ if TYPE_CHECKING:
 @click.option(
     "--grid", type=click.IntRange(min=2), default=7, show_default=True, help="Values a parameter."
 )
+@click.option(
+    "--plot",
+    "picture",
+    type=click.Path(),
+    help="Draw the gain and the travel of every candidate against its torques: .png, .svg or .pdf.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, with the Pareto set.")
 def design(
     robot: str,
@@ -58,6 +66,8 @@ def design(
     objective: Any,
     com_y: str,
     grid: int,
+    picture: str | None,
+    force: bool,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -69,7 +79,10 @@ def design(
     from copsense.design import design_criterion, families
     from copsense.limits import Limits
     from copsense.motion import lateral_sweep
+    from copsense.storage import check_output
 
+    if picture is not None:
+        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
     within = read_limits(limits) or Limits()
     start, stop, count = read_range(com_y)
     stance = read_stance(robot, **options)
@@ -82,6 +95,10 @@ def design(
         found = design_criterion(
             path, within, known[family], objective=objective, grid=grid, progress=update
         )
+    if picture is not None:
+        from copsense.plots import plot_design, save_figure
+
+        save_figure(plot_design(found), picture, overwrite=force)
     if as_json:
         echo_json(
             {
@@ -95,6 +112,8 @@ def design(
         )
     else:
         _print(stance.robot.name, found)
+        if picture is not None:
+            click.echo(f"\ndrawn: {picture}")
 
 
 def _print(robot: str, found: Design) -> None:

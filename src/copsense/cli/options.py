@@ -22,6 +22,16 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+limits_option = click.option(
+    "--limits",
+    metavar="NAME=VALUE,...",
+    help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+    "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+    "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+    "friction); off switches one off. Example: friction=0.33,torque=model.",
+)
+
+
 def stance_options(command: F) -> F:
     """The robot, how it stands, and what it must respect."""
     options = [
@@ -72,14 +82,7 @@ def stance_options(command: F) -> F:
             help="Heading of the base [deg], so that the robot faces +x; a preset has its own.",
         ),
         click.option("--width", type=float, metavar="M", help="Distance between two feet [m]."),
-        click.option(
-            "--limits",
-            metavar="NAME=VALUE,...",
-            help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
-            "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
-            "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
-            "friction); off switches one off. Example: friction=0.33,torque=model.",
-        ),
+        limits_option,
     ]
     return _with(options, command)
 

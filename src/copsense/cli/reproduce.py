@@ -8,6 +8,8 @@ import sys
 import click
 from tqdm import tqdm
 
+from copsense.cli.options import limits_option, read_limits
+
 
 @click.command(epilog="Example: copsense reproduce --output reproduction")
 @click.option(
@@ -24,18 +26,22 @@ from tqdm import tqdm
     show_default=True,
     help="Postures of the iCub's lateral sweep.",
 )
+@limits_option
 @click.option("--force", is_flag=True, help="Overwrite an earlier reproduction.")
 @click.option("--quiet", is_flag=True, help="No progress.")
-def reproduce(output: str, postures: int, force: bool, quiet: bool) -> None:
+def reproduce(output: str, postures: int, limits: str | None, force: bool, quiet: bool) -> None:
     """Reproduce the static half of [Romano2016] on the four-bar and on the iCub.
 
     Every claim of the paper is tested (holds, holds if, does not hold), every figure drawn, and one
-    self-contained HTML report written. The last line printed is its path.
+    self-contained HTML report written. The last line printed is its path. Limits are those of the
+    report's section on them; by default, what public configurations for this robot use.
     """
     from copsense.report import check_report_folder, write_report
+    from copsense.reproduction import LIMITS
     from copsense.reproduction import reproduce as compute
 
     check_report_folder(output, overwrite=force)
+    within = read_limits(limits) or LIMITS
     command = f"copsense {shlex.join(sys.argv[1:])}"
     form = "{desc} {n}/{total} [{elapsed}]"
     # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
@@ -51,6 +57,6 @@ def reproduce(output: str, postures: int, force: bool, quiet: bool) -> None:
                 bar.set_description_str(stage, refresh=False)
             bar.update(done - bar.n)
 
-        result = compute(postures=postures, progress=show)
+        result = compute(postures=postures, limits=within, progress=show)
         path = write_report(result, output, overwrite=force, command=command)
     click.echo(str(path))

@@ -13,6 +13,7 @@ import click
 from copsense.cli.options import (
     criterion_options,
     echo_json,
+    limits_option,
     progress_bar,
     read_criteria,
     read_limits,
@@ -72,6 +73,7 @@ def sweep(
     ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. A posture that fails is
     a row with its reason, and makes the exit code 1.
     """
+    from copsense.recorded import with_limit_margins
     from copsense.storage import check_output, write_results
     from copsense.sweep import failed_rows
     from copsense.sweep import sweep as evaluate
@@ -88,6 +90,8 @@ def sweep(
     path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
         dataset = evaluate(path, chosen, within, progress=update)
+    if within is not None and within.any:
+        dataset = with_limit_margins(dataset, within)
     dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
     failures = failed_rows(dataset)
     if output is not None:
@@ -112,20 +116,31 @@ def sweep(
     click.get_current_context().exit(1 if failures else 0)
 
 
-@click.command(epilog="Example: copsense plot icub.nc --output icub.png")
+@click.command(
+    epilog="Examples: copsense plot icub.nc --output icub.png; "
+    "copsense plot icub.nc --limits friction=0.3,torque=model"
+)
 @click.argument("file", type=click.Path())
 @click.option(
     "--output",
     type=click.Path(),
     help="Picture to write: .png, .svg or .pdf. Default: FILE with .png.",
 )
+@limits_option
 @click.option("--force", is_flag=True, help="Overwrite the output.")
-def plot(file: str, output: str | None, force: bool) -> None:
-    """Draw a sweep written by `copsense sweep`: soles and CoPs, margins, load, CoM travel."""
+def plot(file: str, output: str | None, limits: str | None, force: bool) -> None:
+    """Draw a sweep written by `copsense sweep`: soles and CoPs, margins, load, CoM travel.
+
+    With limits, or of a sweep within limits, the margins to them are drawn too, and where each
+    criterion meets its first one: to the recorded wrenches, whatever the sweep was evaluated with.
+    """
     from copsense.plots import plot_results, save_figure
+    from copsense.recorded import with_limit_margins
     from copsense.storage import check_output, load_results
 
-    dataset = load_results(file)
+    dataset, chosen = load_results(file), read_limits(limits)
+    if chosen is not None:
+        dataset = with_limit_margins(dataset, chosen)
     path = Path(file).with_suffix(".png") if output is None else Path(output)
     check_output(path, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
     save_figure(plot_results(dataset), path, overwrite=force)
@@ -195,6 +210,10 @@ def _longest_run(flags: Any) -> tuple[int, int] | None:
     return best
 
 
+def _rounded(value: float) -> float:
+    return round(value, 1) + 0.0  # no minus before a zero
+
+
 def _print(summary: dict[str, Any]) -> None:
     unit, factor = summary["unit"], 1.0
     if unit == "rad":
@@ -210,7 +229,9 @@ def _print(summary: dict[str, Any]) -> None:
             low, high = (value * factor for value in row["planted"])
             planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
         if math.isfinite(row["smallest_margin"]):
-            planted += f"; smallest margin on the way {row['smallest_margin'] * 1e3:+.1f} mm"
+            planted += (
+                f"; smallest margin on the way {_rounded(row['smallest_margin'] * 1e3):+.1f} mm"
+            )
         click.echo(f"  {name}: {planted}")
     if summary["without_sole"]:
         click.echo(

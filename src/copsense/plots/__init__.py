@@ -14,7 +14,8 @@ from copsense.plots.curves import (
     plot_torques,
     plot_travel,
 )
-from copsense.plots.limits import plot_limited, plot_regions
+from copsense.plots.design import plot_design
+from copsense.plots.limits import plot_limit_margins, plot_limited, plot_regions
 from copsense.plots.paper import (
     plot_criteria_curves,
     plot_figure_3,
@@ -30,10 +31,12 @@ from copsense.plots.summary import plot_results
 __all__ = [
     "plot_cop",
     "plot_criteria_curves",
+    "plot_design",
     "plot_figure_3",
     "plot_figure_9a",
     "plot_figure_9b",
     "plot_foot_cop",
+    "plot_limit_margins",
     "plot_limited",
     "plot_load",
     "plot_margin",

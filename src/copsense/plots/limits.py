@@ -11,12 +11,15 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from numpy.typing import ArrayLike
 
 from copsense.plots.cops import plot_cop
+from copsense.plots.marking import marks, shade_below_zero
 from copsense.plots.reading import MM, abscissa, contact_origins, labels, world_soles
 from copsense.plots.soles import draw_ground, frame_ground
 from copsense.plots.style import (
     INK,
+    LIMIT_LINE,
     MUTED,
     add_legend,
     axes_or_new,
@@ -27,6 +30,8 @@ from copsense.plots.style import (
 )
 from copsense.regions import ComRegion
 
+_AT_LIMIT = 1e-9  # m, N or N m: so near to its bound a limit is active
+_KIND_TITLES = {"cop": "CoP to the edge", "torque": "joint torque"}
 _DEGENERATE = 3  # vertices from which a region has an area
 
 
@@ -48,7 +53,7 @@ def plot_limited(dataset: xr.Dataset, binding: Mapping[str, Sequence[float]]) ->
     for j, name in enumerate(names):
         ends = sorted(value * MM for value in binding.get(name, ()))
         for at in ends:
-            right.axvline(at, color=colour[name], linewidth=0.9, linestyle=(0, (1, 2)))
+            right.axvline(at, color=colour[name], **LIMIT_LINE)
         for k, contact in enumerate(contacts):
             # A line a piece: what jumps is not joined.
             for piece in _pieces(x.values, ends):
@@ -69,6 +74,7 @@ def plot_regions(
     regions: Mapping[str, ComRegion],
     dataset: xr.Dataset,
     *,
+    com: ArrayLike | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw nested regions of the CoM from above, the widest first, with the soles and its path.
@@ -76,6 +82,7 @@ def plot_regions(
     Args:
         regions: what each is called -> the region; a criterion's own has that criterion's colour.
         dataset: a sweep, for the soles and the path of the CoM.
+        com: (2,) world x, y of the CoM at the posture that the regions hold [m].
         ax: where to draw; default a new figure.
     """
     ax = axes_or_new(ax, 6.2, 4.6)
@@ -100,11 +107,92 @@ def plot_regions(
             )
         else:
             ax.plot(outline[:, 1], outline[:, 0], color=shown[name], linewidth=1.8, zorder=3)
-    com = dataset["com"].values[:, :2] * MM
-    ax.plot(com[:, 1], com[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
+    way = dataset["com"].values[:, :2] * MM
+    ax.plot(way[:, 1], way[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
+    if com is not None:
+        x, y = np.asarray(com, dtype=float) * MM
+        ax.plot(y, x, "+", color=INK, markersize=13, markeredgewidth=2, zorder=5)
     frame_ground(ax, world_soles(dataset), contact_origins(dataset), np.vstack(corners))
     add_legend(ax, shown)
     return ax
+
+
+@styled
+def plot_limit_margins(
+    dataset: xr.Dataset, *, axes: Sequence[Axes] | None = None, legend: bool = True
+) -> Figure:
+    """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
+
+    Args:
+        dataset: a sweep with margins, from `copsense.with_limit_margins`.
+        axes: where to draw, one for each of `limit_kinds`; default a new figure.
+        legend: whether to say which colour is which criterion.
+    """
+    kinds = limit_kinds(dataset)
+    if axes is None:
+        axes = new_figure(max(2.9 * len(kinds), 4.2), 3.0).subplots(1, len(kinds), squeeze=False)[0]
+    x, names = abscissa(dataset), labels(dataset, "criterion")
+    colour = colours(names)
+    for ax, kind in zip(axes, kinds, strict=True):
+        of_kind = dataset["limit_kind"].values == kind
+        unit = str(dataset["limit_unit"].values[of_kind][0])
+        scale, unit = (MM, "mm") if unit == "m" else (1.0, unit)
+        margin = dataset["limit_margin"].values[..., of_kind] * scale
+        least = np.where(np.isnan(margin), np.inf, margin).min(axis=-1)
+        least = np.where(np.isfinite(least), least, np.nan)
+        for j, name in enumerate(names):
+            ax.plot(x.values, least[:, j], color=colour[name], **marks(dataset))
+        shade_below_zero(ax, least, "beyond")
+        mark_first_limits(ax, dataset)
+        ax.set_title(_KIND_TITLES.get(kind, kind))
+        ax.set_xlabel(x.label)
+        ax.set_ylabel(f"smallest margin [{unit}]")
+    if legend:
+        add_legend(axes[0], colour)
+    return axes[0].figure  # type: ignore[return-value]
+
+
+def limit_kinds(dataset: xr.Dataset) -> list[str]:
+    """The kinds of limit whose margins a sweep holds, in their order."""
+    return list(dict.fromkeys(str(kind) for kind in dataset["limit_kind"].values))
+
+
+def mark_first_limits(ax: Axes, dataset: xr.Dataset) -> None:
+    """A dotted line where each criterion meets its first limit, to either side of free postures."""
+    x, names = abscissa(dataset).values, labels(dataset, "criterion")
+    colour = colours(names)
+    for j, name in enumerate(names):
+        for at in first_limits(dataset, j):
+            ax.axvline(
+                float(np.interp(at, np.arange(len(x)), x)),
+                color=colour[name],
+                zorder=1,
+                **LIMIT_LINE,
+            )
+
+
+def first_limits(dataset: xr.Dataset, criterion: int) -> list[float]:
+    """Where free postures end, as indices between postures.
+
+    Interpolated between the last free posture and the first beyond; where the wrenches were held
+    at the limit, extrapolated from the last two free ones.
+    """
+    margins = dataset["limit_margin"].values[:, criterion]
+    known = np.where(np.isnan(margins), np.inf, margins)
+    failed = dataset["reason"].values[:, criterion] != ""
+    free = (known.min(axis=-1, initial=np.inf) > _AT_LIMIT) & ~failed
+    ends: list[float] = []
+    for i in np.flatnonzero(free[1:] != free[:-1]):
+        inside, step = (int(i), 1) if free[i] else (int(i) + 1, -1)
+        here, beyond = known[inside], known[inside + step]
+        met = np.isfinite(here) & np.isfinite(beyond) & (beyond <= _AT_LIMIT)
+        lost = here - beyond
+        before = inside - step
+        if 0 <= before < len(free) and free[before] and not failed[inside + step]:
+            held = beyond > -_AT_LIMIT
+            lost = np.where(held, np.maximum(known[before] - here, lost), lost)
+        ends.append(inside + step * float(np.min(here[met] / lost[met], initial=1.0)))
+    return ends
 
 
 def _pieces(x: Float[np.ndarray, " N"], ends: Sequence[float]) -> list[np.ndarray]:

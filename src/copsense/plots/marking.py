@@ -13,6 +13,7 @@ from copsense.plots.reading import abscissa, failed
 from copsense.plots.style import BAD, MUTED
 
 _FEW = 12  # postures: as few as this are shown as points on the line
+_NOTHING = 1e-9  # of the largest value: less below zero is rounding
 _ROOM = 0.1  # of the axes, that a line of text needs
 
 
@@ -55,7 +56,8 @@ def marks(dataset: xr.Dataset) -> dict[str, Any]:
 def shade_below_zero(ax: Axes, values: Float[np.ndarray, "N ..."], words: str) -> None:
     """Shade what is below zero, if anything is; and say what it means, if there is room."""
     ax.axhline(0.0, color=MUTED, linewidth=1.0)
-    if not np.any(values[np.isfinite(values)] < 0):
+    known = values[np.isfinite(values)]
+    if not np.any(known < -_NOTHING * np.abs(known).max(initial=0.0)):
         return
     low, high = ax.get_ylim()
     ax.axhspan(low, 0.0, color=BAD, zorder=0.4, linewidth=0)

@@ -64,6 +64,9 @@ def world_soles(dataset: xr.Dataset) -> list[Float[np.ndarray, "k 2"] | None]:
     axes = dataset["contact_rotation"].values[:, :2, :2]
     soles: list[np.ndarray | None] = []
     for k, polygon in enumerate(dataset["sole_polygon"].values):
+        if np.any(np.isnan(polygon)):
+            soles.append(None)
+            continue
         vertices = polygon[np.r_[True, np.any(np.diff(polygon, axis=0) != 0, axis=1)]]
         soles.append(contact_origins(dataset)[k] + vertices @ axes[k].T * MM)
     return soles

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 
 from copsense.plots.cops import plot_cop
 from copsense.plots.curves import plot_load, plot_travel
+from copsense.plots.limits import limit_kinds, mark_first_limits, plot_limit_margins
 from copsense.plots.reading import (
     MM,
     abscissa,
@@ -25,6 +26,7 @@ from copsense.plots.reading import (
 from copsense.plots.soles import draw_ground, draw_track, frame_ground
 from copsense.plots.style import (
     COM_LINE,
+    LIMIT_LINE,
     MUTED,
     OFF_SOLE,
     colours,
@@ -38,13 +40,29 @@ _LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the
 
 @styled
 def plot_results(dataset: xr.Dataset) -> Figure:
-    """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel."""
-    figure = new_figure(9.0, 7.2)
-    ((above, cop), (load, travel)) = figure.subplots(2, 2)
+    """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel.
+
+    If it has margins to limits, from `copsense.with_limit_margins`, these are drawn below, and a
+    dotted line in each panel where a criterion meets its first limit.
+    """
+    kinds = limit_kinds(dataset) if "limit_margin" in dataset else []
+    figure = new_figure(9.0, 10.0 if kinds else 7.2)
+    n = max(len(kinds), 1)
+    grid = figure.add_gridspec(3 if kinds else 2, 2 * n)
+    above, cop, load, travel = (
+        figure.add_subplot(grid[i, j * n : (j + 1) * n]) for i in (0, 1) for j in (0, 1)
+    )
     _draw_above(above, dataset)
     plot_cop(dataset, axis=widest_axis(dataset), ax=cop, legend=False)
     plot_load(dataset, ax=load, legend=False)
     plot_travel(dataset, ax=travel, legend=False)
+    if kinds:
+        below = [figure.add_subplot(grid[2, 2 * i : 2 * i + 2]) for i in range(n)]
+        plot_limit_margins(dataset, axes=below, legend=False)
+        for ax in below[1:]:
+            ax.set_ylabel(ax.get_ylabel().replace("smallest margin ", ""))
+        for ax in (cop, load, travel):
+            mark_first_limits(ax, dataset)
     above.set_title("where the CoPs go, from above")
     cop.set_title("CoPs between the soles' edges")
     load.set_title("who carries the weight")
@@ -101,6 +119,8 @@ def _handles(dataset: xr.Dataset) -> list[Line2D]:
         for name, style in line_styles(contacts).items()
     ]
     handles.append(Line2D([], [], label="CoM", **COM_LINE))
+    if "limit_margin" in dataset and limit_kinds(dataset):
+        handles.append(Line2D([], [], label="first limit met", color=MUTED, **LIMIT_LINE))
     if not np.all(planted(dataset) | failed(dataset)[..., None]):
         handles.append(Line2D([], [], color=MUTED, label="CoP off its sole", **OFF_SOLE))
     return handles

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
+from copsense.binding import LimitChange
 from copsense.paper.lateral import TORQUE, WRENCH
 from copsense.plots import (
     plot_cop,
@@ -290,18 +291,14 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
     binding: dict[str, list[float]] = {}
     for found in within.bindings:
         binding.setdefault(found.criterion, []).append(found.com_y)
-    first = {name: min(abs(y) for y in ys) * 1e3 for name, ys in binding.items()}
-    said = " and ".join(f"{mm:.1f} mm under {name}" for name, mm in first.items())
-    areas = {name: region.area * 1e4 for name, region in within.regions.items()}
+    areas = {name: f"{region.area * 1e4:.0f} cm²" for name, region in within.regions.items()}
+    torques = areas.get("and torque limits")
     return (
         ReportFigure(
             "limits",
             "limits",
             "Within limits, iCub.",
-            f"The first limit binds at a CoM travel of {said}: there the CoP stops at the sole's "
-            "edge (left), its slope falls to nearly zero and the other foot's jumps up (right; "
-            "verticals where the first limit binds), because it has to carry what the first no "
-            "longer can.",
+            _binding_words(within.bindings),
             "CoP y of both feet against CoM y, flat at the soles' edges; slopes with jumps where "
             "the limits bind.",
             lambda: plot_limited(within.lateral, binding),
@@ -311,18 +308,38 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "regions",
             "limits",
             "Where the CoM may be, iCub.",
-            "Nested: where friction and soles allow an equilibrium ("
-            f"{areas['friction and soles']:.0f} cm²), where the motors do too "
-            f"({areas['and torque limits']:.0f} cm²), and where each criterion's own wrenches stay "
-            f"within the limits without being clipped ({areas[WRENCH]:.0f} cm² under minimum "
-            f"wrench, {areas[TORQUE]:.0f} cm² under minimum torque). The joints' posture is held "
-            "while the weight's line of action moves.",
+            "Nested: where friction and soles allow an equilibrium "
+            f"({areas['friction and soles']}), "
+            + (f"where the motors do too ({torques}), " if torques else "")
+            + "and where each criterion's own wrenches stay within the limits without being "
+            f"clipped ({areas[WRENCH]} under minimum wrench, {areas[TORQUE]} under minimum "
+            "torque). The joints' posture is held while the weight's line of action moves; a robot "
+            "that leans by itself follows the dashed path, and meets its first limit where the "
+            "table says.",
             "Nested polygons over the two soles from above: the widest for friction and soles, the "
             "smallest for the criteria's own.",
             lambda: _figure(plot_regions(within.regions, paper_criteria(reproduction))),
             shape="alone",
         ),
     )
+
+
+def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
+    """Where the first limit binds, and what happens there."""
+    if not bindings:
+        return "No limit binds between the feet."
+    first: dict[str, LimitChange] = {}
+    for found in sorted(bindings, key=lambda b: b.travel):
+        first.setdefault(found.criterion, found)
+    said = " and ".join(f"{b.travel * 1e3:.1f} mm under {name}" for name, b in first.items())
+    words = f"The first limit binds at a CoM travel of {said} (right: verticals)"
+    if all("CoP" in b.limit for b in bindings):
+        return (
+            f"{words}: there the CoP stops at the sole's edge (left), its slope falls to nearly "
+            "zero and the other foot's jumps up, because it has to carry what the first no longer "
+            "can."
+        )
+    return f"{words}: there the slopes jump, because the other foot carries what one no longer can."
 
 
 def paper_criteria(reproduction: Reproduction) -> xr.Dataset:

@@ -89,7 +89,9 @@ def number(value: float, unit: str = "1") -> str:
 
 def _binding(found: LimitChange) -> dict[str, str]:
     sides = {
-        name: ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
+        name: "a foot carries no load"
+        if side is None
+        else ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
         for name, side in (("before", found.before), ("after", found.after))
     }
     where = f"{found.com_y * 1e3:+.2f} mm"

@@ -10,7 +10,6 @@ from copsense.paper import EvaluatedErratum, Verdict
 from copsense.paper.lateral import SHORT, TORQUE, WRENCH
 from copsense.reproduction import Reproduction
 
-_LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 _ROUNDING = 1e-9  # differences below this are rounding
 
 
@@ -47,12 +46,48 @@ def summary(reproduction: Reproduction) -> tuple[str, ...]:
 
 def limit_words(limits: Limits) -> str:
     """Limits as a sentence's part."""
-    return (
-        f"normal force of each foot over {limits.normal_force:g} N, friction coefficient "
-        f"{limits.friction:.3g} (pyramid of {limits.friction_sides} sides), torsion "
-        f"{limits.torsion:.3g} m, CoP inside the sole, and the model's torque limits, which are "
-        "real for the legs only"
-    )
+    words = []
+    if limits.normal_force is not None:
+        words.append(f"normal force of each foot over {limits.normal_force:g} N")
+    if limits.friction is not None:
+        given = "the contacts' own" if limits.friction == "contact" else f"{limits.friction:.3g}"
+        words.append(f"friction coefficient {given} (pyramid of {limits.friction_sides} sides)")
+    if limits.torsion is not None:
+        given = {"contact": "the contacts' own", "cone": "that of the sole's friction"}.get(
+            str(limits.torsion), f"{limits.torsion} m"
+        )
+        if not isinstance(limits.torsion, str):
+            given = f"{limits.torsion:.3g} m"
+        words.append(f"torsion {given}")
+    if limits.cop_margin is not None:
+        inside = f" by {limits.cop_margin * 1e3:g} mm" if limits.cop_margin else ""
+        words.append(f"CoP inside the sole{inside}")
+    if limits.torque == "model":
+        words.append("the model's torque limits, which are real for the legs only")
+    elif limits.torque is not None:
+        words.append(f"torques of {limits.torque:g} N m at most")
+    return ", ".join(words)
+
+
+def limits_option(limits: Limits) -> str:
+    """The same as `--limits` takes them."""
+    given = {
+        "normal-force": limits.normal_force,
+        "friction": limits.friction,
+        "sides": limits.friction_sides,
+        "cop-margin": limits.cop_margin,
+        "torsion": limits.torsion,
+        "torque": limits.torque,
+    }
+    usual = {name.replace("_", "-"): f.default for name, f in Limits.__dataclass_fields__.items()}
+    usual["sides"] = usual["friction-sides"]
+
+    def text(value: object) -> str:
+        return (
+            "off" if value is None else f"{value:.6g}" if isinstance(value, float) else f"{value}"
+        )
+
+    return ",".join(f"{n}={text(value)}" for n, value in given.items() if value != usual[n])
 
 
 def differs(evaluated: EvaluatedErratum) -> bool:
@@ -100,6 +135,7 @@ def commands(reproduction: Reproduction, command: str) -> dict[str, tuple[str, .
     )
     xi = math.acos(fb.rod_length / 2 / (fb.kappa * fb.leg_length))
     span = f"--com-y {-facts.half:g}:{facts.half:g}:{reproduction.postures}"
+    within = limits_option(reproduction.within_limits.limits)
     sweep = f"copsense sweep icub {span} --criterion minimum-wrench --criterion minimum-torque"
     return {
         "all": (command,),
@@ -113,9 +149,9 @@ def commands(reproduction: Reproduction, command: str) -> dict[str, tuple[str, .
             f"{sweep} --contact-at sole --output icub_at_sole.nc",
         ),
         "limits": (
-            f"{sweep} --limits {_LIMITS} --output icub_within.nc",
-            f"copsense analyse icub --limits {_LIMITS}",
-            f"copsense design icub --family joints --limits {_LIMITS}",
+            f"{sweep} --limits {within} --output icub_within.nc",
+            f"copsense analyse icub --limits {within}",
+            f"copsense design icub --family joints --limits {within}",
         ),
         "beyond": (
             f"copsense sweep icub {span} --criterion minimum-wrench "

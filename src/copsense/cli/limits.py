@@ -1,0 +1,183 @@
+"""What `copsense analyse` says of limits: which are active, how far each is, and the regions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from copsense.criterion import Criterion
+    from copsense.limits import Limits
+    from copsense.sensitivity import CopSensitivity
+    from copsense.stance import Stance
+
+_REACH, _POSTURES = 0.05, 21  # of the CoM's path that is drawn with the regions [m]
+
+
+def add_limits(
+    answer: dict[str, Any],
+    stance: Stance,
+    criteria: list[Criterion],
+    results: dict[str, CopSensitivity],
+    limits: Limits,
+    tangent: Any,
+) -> None:
+    """Active limits, margins, the CoM's travel to each limit and to the next change of the active.
+
+    The changes are along the path's tangent, to either side, first order and exact.
+    """
+    from copsense.binding import next_change
+    from copsense.equilibrium import ConstrainedEquilibrium
+    from copsense.limits import torque_placeholders
+    from copsense.margins import limit_margins, limit_travel
+
+    if limits.torque == "model" and torque_placeholders(stance):
+        answer.setdefault("notes", []).append(
+            "no torque limit in the model (a placeholder) for: "
+            + ", ".join(torque_placeholders(stance))
+        )
+    for criterion in criteria:
+        row, equilibrium = answer["criteria"][criterion.name], results[criterion.name].equilibrium
+        assert isinstance(equilibrium, ConstrainedEquilibrium)
+        row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
+        row["optimality"] = equilibrium.optimality()
+        row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
+        predicted = results[criterion.name].active_set_changes(tangent)
+        row["next_change"] = {}
+        for side, first in ((1, predicted[1]), (-1, predicted[0])):
+            exact = next_change(stance, criterion, limits, side)
+            row["next_change"][f"{'+' if side > 0 else '-'}y"] = {
+                "first_order": None if first is None else asdict(first),
+                "exact": None
+                if exact is None
+                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+            }
+        row["limit_travel"] = {
+            f"{'+' if side > 0 else '-'}y": [
+                {
+                    "name": t.margin.name,
+                    "margin": t.margin.value,
+                    "unit": t.margin.unit,
+                    "first_order": t.first_order,
+                    "exact": t.exact,
+                }
+                for t in limit_travel(stance, criterion, limits, side).limits
+            ]
+            for side in (1, -1)
+        }
+
+
+def limit_verdict(answer: dict[str, Any]) -> str:
+    """The same of the first limit met to either side, found along the path."""
+    reach = {
+        name: min(
+            (math.inf if t["exact"] is None else t["exact"], t["name"])
+            for travels in row["limit_travel"].values()
+            for t in travels
+        )
+        for name, row in answer["criteria"].items()
+    }
+    best = max(reach, key=lambda name: reach[name][0])
+    distance, limit = reach[best]
+    if distance == 0:
+        return "Every criterion meets a limit here already."
+    if not math.isfinite(distance):
+        return f"{best} meets no limit within reach."
+    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n != best)
+    return (
+        f"{best} is the last to meet a limit: the CoM may move {distance * 1e3:.1f} mm until "
+        f"{limit}" + (f" ({others})." if others else ".")
+    )
+
+
+def print_limits(row: dict[str, Any]) -> None:
+    """Active limits, and how far the CoM may go to either side."""
+    names = "; ".join(
+        limit["name"] + ("" if limit["multiplier"] else " (touched)")
+        for limit in row["active_limits"]
+    )
+    click.echo(f"  active limits: {names or 'none'}")
+    for side, change in row["next_change"].items():
+        first, exact = change["first_order"], change["exact"]
+        if row["active_limits"] and exact is not None:
+            predicted = f"{first['travel'] * 1e3:.1f}" if first else "never"
+            click.echo(
+                f"  CoM to {side}: {exact['travel'] * 1e3:6.1f} mm until {exact['name']} "
+                f"{'binds' if exact['binds'] else 'lets go'} (first order: {predicted})"
+            )
+    for side, travels in row["limit_travel"].items():
+        for travel in travels[:3]:
+            if travel["exact"] is None:
+                continue
+            first = travel["first_order"]
+            predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
+            click.echo(
+                f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
+                f"(first order: {predicted})"
+            )
+
+
+def add_regions(
+    answer: dict[str, Any],
+    stance: Stance,
+    criteria: list[Criterion],
+    limits: Limits,
+    picture: str,
+    *,
+    overwrite: bool,
+) -> None:
+    """The regions of the CoM that the limits leave, drawn with the soles and the lateral path."""
+    from copsense.motion import lateral_sweep
+    from copsense.plots import plot_regions, save_figure
+    from copsense.plots.style import Figure
+    from copsense.regions import com_region, criterion_region
+    from copsense.sweep import sweep
+
+    regions = {"friction and soles": com_region(stance, replace(limits, torque=None))}
+    if limits.torque is not None:
+        regions["and torque limits"] = com_region(stance, limits)
+    for criterion in criteria:
+        regions[criterion.name] = criterion_region(stance, criterion, limits)
+    y = float(stance.com[1])
+    x = None if stance.robot.base_nv != 6 else float(stance.com[0])
+    path = lateral_sweep(stance, y - _REACH, y + _REACH, _POSTURES, com_x=x)
+    figure = plot_regions(regions, sweep(path, criteria), com=stance.com[:2]).figure
+    assert isinstance(figure, Figure)
+    save_figure(figure, picture, overwrite=overwrite)
+    answer["regions"] = {
+        "plot": picture,
+        "of": {
+            name: {
+                "polygon": region.polygon,
+                "area": region.area,
+                "gap": region.gap,
+                "bounded": region.bounded,
+                "margin": region.margin(stance.com[:2]),
+            }
+            for name, region in regions.items()
+        },
+    }
+
+
+def print_regions(regions: dict[str, Any]) -> None:
+    """How large they are, and how far the CoM is inside."""
+    click.echo("regions of the CoM, contacts and joints held at this posture:")
+    width = max(map(len, regions["of"]))
+    for name, row in regions["of"].items():
+        click.echo(f"  {name:{width}}  {_size(row)}")
+    click.echo(f"drawn: {regions['plot']}")
+
+
+def _size(row: dict[str, Any]) -> str:
+    if not len(row["polygon"]):
+        return "empty"
+    if not row["bounded"]:
+        return "without end"
+    size = f"{row['area'] * 1e4:8.1f} cm2"
+    if row["area"] == 0:
+        size = f"{math.dist(row['polygon'][0], row['polygon'][-1]) * 1e3:8.1f} mm wide"
+    where = "inside" if row["margin"] >= 0 else "outside"
+    return f"{size}, the CoM {abs(row['margin']) * 1e3:.1f} mm {where}"

@@ -1,0 +1,60 @@
+"""plot_design: what a designed criterion gains, and what it costs in torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from copsense.design import Design, Score, pareto
+from copsense.plots.reading import MM
+from copsense.plots.style import INK, MUTED, colours, new_figure, styled
+
+_ALL = "candidates"
+
+
+@styled
+def plot_design(design: Design) -> Figure:
+    """Draw every candidate's CoM gain and CoM travel against its torque norm.
+
+    The line joins the Pareto set: candidates that no other beats in both. The paper's two criteria
+    and the designed one stand beside them.
+    """
+    figure = new_figure(9.2, 4.2)
+    gain, travel = figure.subplots(1, 2)
+    _draw(gain, design, lambda s: s.worst_gain, 1.0)
+    _draw(travel, design, lambda s: s.travel * MM, -1.0)
+    gain.set_ylabel("largest |dCoP/dCoM| [m/m]")
+    travel.set_ylabel("CoM travel to the first limit [mm]")
+    gain.set_title("sensitivity: the lower the better")
+    travel.set_title("travel: the higher the better")
+    near = f"within {design.score.range * MM:.0f} mm of the middle"
+    for ax in (gain, travel):
+        ax.set_xlabel(f"torque norm [N m], rms {near}")
+    handles, names = gain.get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside lower center", ncols=len(names))
+    return figure
+
+
+def _draw(ax: Axes, design: Design, value: Callable[[Score], float], sign: float) -> None:
+    """Candidates as points, those that no other beats joined; `sign` +1 where less is better."""
+    points = np.array([(s.torque_norm, value(s)) for s in design.candidates])
+    ax.plot(*points.T, ".", color="#b9c2ca", markersize=4, label=_ALL, zorder=2)
+    front = pareto(design.candidates, lambda s: sign * value(s))
+    line = np.array([(s.torque_norm, value(s)) for s in front])
+    ax.plot(*line.T, color=MUTED, linewidth=1.4, drawstyle="steps-post", zorder=3)
+    ax.plot(*line.T, "o", color=MUTED, markersize=4, label="Pareto set", zorder=3)
+    colour = colours([s.criterion for s in design.baselines])
+    for score in design.baselines:
+        shade = colour[score.criterion]
+        at = (score.torque_norm, value(score))
+        ax.plot(*at, "D", color=shade, markersize=8, label=score.criterion, zorder=4)
+    at = (design.score.torque_norm, value(design.score))
+    ax.plot(*at, "*", color=INK, markersize=15, label=f"designed ({design.objective})", zorder=5)
+    # A candidate that squanders torque would press the others against the axis.
+    low, high = points[:, 0].min(), np.median(points[:, 0])
+    shown = [s.torque_norm for s in (*design.baselines, *front, design.score)]
+    high = max(2 * high - low, *shown)
+    ax.set_xlim(low - 0.05 * (high - low), high + 0.05 * (high - low))
