@@ -7,7 +7,7 @@ import tempfile
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -41,7 +41,7 @@ class Description:
         path: the file the text came from, if any.
     """
 
-    text: str
+    text: str = field(repr=False)
     language: Language
     package_dirs: tuple[str, ...] = ()
     path: Path | None = None

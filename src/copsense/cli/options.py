@@ -16,6 +16,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from copsense.contact import Contact
     from copsense.criterion import Criterion
+    from copsense.limits import Limits
     from copsense.stance import Stance
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -86,6 +87,14 @@ def stance_options(command: F) -> F:
             show_default=True,
             metavar="M",
             help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
+        ),
+        click.option(
+            "--limits",
+            metavar="NAME=VALUE,...",
+            help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+            "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+            "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+            "friction); off switches one off. Example: friction=0.33,torque=model.",
         ),
     ]
     for option in reversed(options):
@@ -201,6 +210,46 @@ def read_range(text: str) -> tuple[float, float, int]:
     except ValueError:
         raise InvalidInputError(
             f"the range {text!r} is not understood. Give START:STOP:COUNT, such as -0.07:0.07:201."
+        ) from None
+
+
+def read_limits(text: str | None) -> Limits | None:
+    """The limits that ``--limits`` describes, or None."""
+    from copsense.limits import Limits
+
+    if text is None:
+        return None
+    names = {
+        "normal-force": "normal_force",
+        "friction": "friction",
+        "sides": "friction_sides",
+        "cop-margin": "cop_margin",
+        "torsion": "torsion",
+        "torque": "torque",
+    }
+    values: dict[str, Any] = {}
+    for part in filter(None, text.split(",")):
+        name, _, value = part.partition("=")
+        if name not in names:
+            raise UnknownNameError("limit", name, names)
+        values[names[name]] = _limit_value(name, value)
+    return Limits(**values)
+
+
+def _limit_value(name: str, value: str) -> float | int | str | None:
+    if value == "off":
+        return None
+    if value in {
+        "friction": ("contact",),
+        "torsion": ("contact", "cone"),
+        "torque": ("model",),
+    }.get(name, ()):
+        return value
+    try:
+        return int(value) if name == "sides" else float(value)
+    except ValueError:
+        raise InvalidInputError(
+            f"the limit {name}={value!r} is no number. Write, say, {name}=8 or {name}=off."
         ) from None
 
 

@@ -14,6 +14,7 @@ from copsense.cli.options import (
     echo_json,
     progress_bar,
     read_criteria,
+    read_limits,
     read_range,
     read_stance,
     stance_options,
@@ -55,6 +56,7 @@ def sweep(
     robot: str,
     criteria: tuple[str, ...],
     characteristic_length: float,
+    limits: str | None,
     com_y: str | None,
     joint: str | None,
     configurations: str | None,
@@ -80,9 +82,10 @@ def sweep(
     if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
+    within = read_limits(limits)
     path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
-        dataset = evaluate(path, chosen, progress=update)
+        dataset = evaluate(path, chosen, within, progress=update)
     dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
     failures = failed_rows(dataset)
     if output is not None:
@@ -154,7 +157,10 @@ def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str,
     criteria = {}
     for name in dataset["criterion"].values:
         here = dataset.sel(criterion=name)
-        planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
+        if "active_limits" in dataset:
+            planted = (here["active_limits"] == "").values & (here["reason"] == "").values
+        else:
+            planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
         run = _longest_run(planted)
         criteria[str(name)] = {
             "planted": sorted(float(values[i]) for i in run) if run else None,
@@ -169,6 +175,7 @@ def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str,
         "failed_rows": len(failures),
         "output": output,
         "criteria": criteria,
+        "limits": dataset.attrs.get("limits"),
     }
 
 
@@ -191,11 +198,12 @@ def _print(summary: dict[str, Any]) -> None:
         unit, factor = "deg", 180.0 / math.pi
     click.echo(f"{summary['robot']}: {summary['postures']} postures along {summary['coordinate']}")
     for name, row in summary["criteria"].items():
+        word = "no limit active" if summary["limits"] else "every contact planted"
         if row["planted"] is None:
-            planted = "no posture keeps every contact planted"
+            planted = f"{word} at no posture"
         else:
             low, high = (value * factor for value in row["planted"])
-            planted = f"every contact planted from {low:+.4g} to {high:+.4g} {unit}"
+            planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
         if math.isfinite(row["smallest_margin"]):
             planted += f"; smallest margin on the way {row['smallest_margin'] * 1e3:+.1f} mm"
         click.echo(f"  {name}: {planted}")
