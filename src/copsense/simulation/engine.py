@@ -194,8 +194,8 @@ class MujocoSimulator:
                 if not off <= _AGREEMENT:
                     raise EngineMismatchError(
                         f"MuJoCo and Pinocchio disagree on the {what} of {robot.name!r}, "
-                        f"relatively by {off:.1e}. A joint or an inertia of this robot is not supported; "
-                        "simplify its description."
+                        f"relatively by {off:.1e}. A joint or an inertia of this robot is not "
+                        "supported; simplify its description."
                     )
 
 
