@@ -3,6 +3,7 @@
 from copsense.controllers.balancing import BalancingController
 from copsense.controllers.controller import Command, Controller, Observation, controller_name
 from copsense.controllers.gains import STIFF, Gains, public_gains
+from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import LoadProblem, ShareByCriterion, ShareLoad
 from copsense.controllers.target import (
     Hold,
@@ -27,6 +28,7 @@ __all__ = [
     "Ramp",
     "ShareByCriterion",
     "ShareLoad",
+    "ShareWithinLimits",
     "Signal",
     "Sine",
     "Target",

@@ -26,8 +26,10 @@ from jaxtyping import Float
 from copsense.controllers.controller import Command, Observation
 from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
+from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import LoadProblem, ShareByCriterion, ShareLoad
 from copsense.criterion import Criterion
+from copsense.limits import Limits
 from copsense.stance import Stance
 
 _RANK = 1e-10  # relative pivot under which the contacts are taken as redundant
@@ -40,7 +42,8 @@ class BalancingController:
         stance: robot, contacts and the posture around which it balances.
         criterion: how the load is shared among the contacts.
         gains: stiffness and damping.
-        share: shares the load instead of `ShareByCriterion`, such as a solver with limits.
+        limits: what the contact wrenches and torques must respect, or None for no limits.
+        share: shares the load instead of `ShareByCriterion` or `ShareWithinLimits`.
         name: how it is called in results; default the criterion's name.
     """
 
@@ -50,12 +53,15 @@ class BalancingController:
         criterion: Criterion,
         gains: Gains = STIFF,
         *,
+        limits: Limits | None = None,
         share: ShareLoad | None = None,
         name: str | None = None,
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
         self.stance, self.criterion, self.gains = stance, criterion, gains
         self.name = name or criterion.name
+        if share is None and limits is not None and limits.any:
+            share = ShareWithinLimits(stance, criterion, limits)
         self._share = share or ShareByCriterion(stance, criterion)
         self._dynamics = StandingDynamics(stance)
         self._gravity = np.array(stance.robot.model.gravity.linear)
@@ -64,7 +70,8 @@ class BalancingController:
         decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
         scale = 1.0 / np.diag(np.linalg.inv(decoupled)) if gains.scaled_by_inertia else 1.0
         self._posture_gains = kp * scale, kd * scale
-        self._compute(np.zeros(6), np.zeros(len(kp)))
+        upright = self._dynamics.base_wrench(-self._dynamics.mass * self._gravity, np.zeros(3))
+        self._compute(upright, np.zeros(len(kp)))
 
     def __call__(self, observation: Observation) -> Command:
         """The torques at a state, and the contact wrenches they are to cause."""

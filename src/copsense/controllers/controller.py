@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -91,7 +91,7 @@ def ask(
         raise ControllerError(
             f"{when} raised {type(error).__name__}: {error}. Mend the controller at this state."
         ) from error
-    torques = answer.torques if isinstance(answer, Command) else answer
+    torques: Any = answer.torques if isinstance(answer, Command) else answer
     wrenches = answer.wrenches if isinstance(answer, Command) else None
     usual = isinstance(torques, np.ndarray) and torques.dtype == np.float64
     if usual and torques.shape == (n,) and np.all(np.isfinite(torques)):  # without a copy

@@ -9,10 +9,9 @@ import pinocchio as pin
 import xarray as xr
 
 from copsense._version import __version__
-from copsense.contact import COMPONENT_NAMES
+from copsense.contact import COMPONENT_NAMES, half_planes
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
-from copsense.cop import half_planes
 from copsense.simulation.simulator import Snapshot
 from copsense.simulation.watch import Event
 from copsense.stance import Stance

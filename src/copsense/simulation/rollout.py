@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -104,6 +105,8 @@ def rollout(
             recorder.add(here, now, target, command, torques, watch.tilts(now))
         if ends:
             end = ends
+            if tip and tip is not ends:  # what came of it
+                end = replace(ends, message=f"{tip.message}; then {ends.message}")
             break
         if progress and number - reported >= _REPORT:
             progress(number - reported)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from copsense.contact import Contact
-from copsense.cop import half_planes
+from copsense.contact import Contact, half_planes
 from copsense.errors import InvalidInputError
 
 
