@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -47,6 +47,7 @@ class Command:
     wrenches: Float[np.ndarray, "nc 6"] | None = None
 
 
+@runtime_checkable
 class Controller(Protocol):
     """State in, torques out: any callable, a function or an object with ``__call__``."""
 

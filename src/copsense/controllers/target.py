@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
@@ -42,6 +42,7 @@ class Target:
     velocity: Float[np.ndarray, " nv"]
 
 
+@runtime_checkable
 class Signal(Protocol):
     """A distance along a path as a function of time."""
 

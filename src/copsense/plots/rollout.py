@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -54,8 +55,8 @@ def plot_rollout(dataset: xr.Dataset, *, against: str | None = None) -> Figure:
             ax.axvline(tip, color="#b3261e", linewidth=1.0, linestyle=(0, (4, 2)))
     attributes = dataset.attrs
     figure.suptitle(
-        f"{attributes['robot']} under {attributes.get('controller', 'a controller')}: "
-        f"{attributes['end_reason']} at {float(attributes['end_time']):.2f} s",
+        f"{attributes['robot']} under {attributes.get('controller', 'a controller')}, "
+        f"{float(attributes['end_time']):.2f} s\n{textwrap.shorten(attributes['end_reason'], 120)}",
         x=0.01,
         ha="left",
         fontsize=12.5,
@@ -136,12 +137,23 @@ def _draw_torques(ax: Axes, dataset: xr.Dataset) -> None:
     torque = dataset["torque"].transpose("time", "joint").values
     names = labels(dataset, "joint")
     ax.plot(dataset["time"], torque, color=MUTED, linewidth=0.7, alpha=0.5)
-    largest = np.argsort(-np.abs(torque[len(torque) // 20 :]).max(axis=0))[:_MOST_NAMED]
+    standing = torque[_standing(dataset)]
+    largest = np.argsort(-np.abs(standing).max(axis=0))[:_MOST_NAMED]
     handles = []
     for c, j in zip(_CONTACTS, largest, strict=False):
         handles += ax.plot(dataset["time"], torque[:, j], color=c, linewidth=1.4, label=names[j])
-    ax.set_ylabel("torque [Nm]")
+    reach = 1.15 * float(np.abs(standing).max()) + 0.1
+    ax.set_ylim(-reach, reach)
+    ax.set_ylabel("torque, before a tip [Nm]")
     put_legend(ax, handles)
+
+
+def _standing(dataset: xr.Dataset) -> np.ndarray:
+    """Rows (N,) before the first tip, without the first, which has no contact force yet."""
+    tip, time = float(dataset.attrs.get("tip_time", np.nan)), dataset["time"].values
+    rows = time <= tip if np.isfinite(tip) else np.ones(len(time), dtype=bool)
+    rows[0] = len(rows) == 1
+    return rows if np.any(rows) else np.ones(len(time), dtype=bool)
 
 
 def _hip_roll(dataset: xr.Dataset) -> str | None:
@@ -152,21 +164,25 @@ def _hip_roll(dataset: xr.Dataset) -> str | None:
 def _draw_against(ax: Axes, dataset: xr.Dataset, colour: dict[str, str], joint: str | None) -> None:
     """CoP y in each foot's frame against a joint or the CoM, the static prediction under it."""
     start = float(dataset["com"].sel(com_axis="y").values[0])
-    com = dataset["com"].sel(com_axis="y").values * MM
-    x, label = com, "CoM y [mm]"
+    rows = _standing(dataset)
+    x, label = dataset["com"].sel(com_axis="y").values * MM, "CoM y before a tip [mm]"
     if joint is not None:
-        x, label = dataset["joint_position"].sel(joint=joint).values * DEG, f"{joint} [deg]"
+        x, label = (
+            dataset["joint_position"].sel(joint=joint).values * DEG,
+            f"{joint} before a tip [deg]",
+        )
     styles = line_styles(list(colour))
     if "static_cop" in dataset:
-        travel = (dataset["static_travel"].values + start) * MM
-        # The joint where the robot had its CoM there; the path says it by the CoM.
-        order = np.argsort(com)
-        there = np.interp(travel, com[order], x[order], left=np.nan, right=np.nan)
+        there = (dataset["static_travel"].values + start) * MM
+        if joint is not None:
+            there = dataset["static_joint"].sel(joint=joint).values * DEG
+        within = (there >= x[rows].min() - 0.5) & (there <= x[rows].max() + 0.5)
         for k in range(len(colour)):
-            ax.plot(there, dataset["static_cop"].values[:, k, 1] * MM, **_STATIC)
+            cop = np.where(within, dataset["static_cop"].values[:, k, 1] * MM, np.nan)
+            ax.plot(there, cop, **_STATIC)
     for k, (name, c) in enumerate(colour.items()):
         cop = dataset["cop"].values[:, k, 1] * MM
-        ax.plot(x, cop, color=c, linewidth=1.3, linestyle=styles[name])
+        ax.plot(x[rows], cop[rows], color=c, linewidth=1.3, linestyle=styles[name])
     reach = [np.abs(s).max() for s in _local_soles(dataset)]
     if reach:
         ax.set_ylim(-1.3 * max(reach), 1.3 * max(reach))

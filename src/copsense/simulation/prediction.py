@@ -28,6 +28,7 @@ class StaticPrediction:
     Attributes:
         values: the path's coordinate, relative to the start (N,) [m].
         cops: centre of pressure of each contact (N, nc, 2), contact axes [m]; NaN where unloaded.
+        joints: position of each joint (N, n) [rad, m].
         excursion: how far from the start the path's coordinate may go until the first contact's
             CoP reaches an edge [m]; infinite where none does on this path.
         contact: the contact that tips first, or nothing.
@@ -36,6 +37,7 @@ class StaticPrediction:
 
     values: Float[np.ndarray, " N"]
     cops: Float[np.ndarray, "N nc 2"]
+    joints: Float[np.ndarray, "N n"]
     excursion: float
     contact: str
     first_order: float
@@ -45,6 +47,11 @@ class StaticPrediction:
         what = {"units": "m", "long_name": "static centre of pressure along the path, contact axes"}
         return dataset.assign(
             static_cop=(("static", "contact", "axis"), self.cops, what),
+            static_joint=(
+                ("static", "joint"),
+                self.joints,
+                {"units": "rad, m", "long_name": "joint position along the path"},
+            ),
             static_travel=(
                 "static",
                 self.values,
@@ -92,7 +99,11 @@ def predict(
                     at = float(travel[i - 1] + part * (travel[i] - travel[i - 1]))
                 if at < excursion:
                     excursion, contact = at, path.stances[0].contact_names[k]
-    return StaticPrediction(values, cops, excursion, contact, float(first_order))
+    robot = path.stances[0].robot
+    joints = np.array(
+        [[robot.joint_position(s.q, joint) for joint in robot.joint_names] for s in path.stances]
+    )
+    return StaticPrediction(values, cops, joints, excursion, contact, float(first_order))
 
 
 def predict_lean(

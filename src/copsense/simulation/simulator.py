@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -49,6 +49,7 @@ class SimulatorStoppedError(CopsenseError):
         super().__init__(f"{reason}, at {time:.3f} s")
 
 
+@runtime_checkable
 class Simulator(Protocol):
     """A robot on its contacts under torques.
 
