@@ -86,7 +86,9 @@ class BalancingController:
             - kp * (dyn.com - target.com)
             - kd * (dyn.com_velocity - target.com_velocity)
         )
-        turning = -self.gains.momentum_damping * dyn.angular_momentum
+        # The reference's own angular momentum is not braked: the posture would lag behind it.
+        spin = dyn.angular_momentum - dyn.angular_map @ target.velocity
+        turning = -self.gains.momentum_damping * spin
         turning -= self.gains.momentum_stiffness * (dyn.angular_map @ away)
         wrench = dyn.base_wrench(dyn.mass * (acceleration - self._gravity), turning)
         stiffness, damping = self._posture_gains

@@ -19,7 +19,7 @@ class Gains:
     Attributes:
         com_stiffness: Kp of the centre of mass, world x, y, z [1/s^2].
         com_damping: Kd of the centre of mass, world x, y, z [1/s].
-        momentum_damping: Kp_w on the angular momentum [1/s].
+        momentum_damping: Kp_w on the angular momentum beyond the reference's own [1/s].
         momentum_stiffness: Ki_w on the angular momentum's integral, A_G(q) (q - q_d) [1/s^2].
         posture_stiffness: Kp of every joint, or of each by name. With `scaled_by_inertia`
             [1/s^2], times the joint's effective inertia; otherwise [Nm/rad].

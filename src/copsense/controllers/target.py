@@ -20,6 +20,7 @@ from copsense.motion import Path, lateral_sweep
 from copsense.stance import Stance
 
 _SPACING = 2e-3  # m between the postures of a lateral reference
+_COARSE = 10  # times as far apart are those that find out whether it can be reached
 _SLACK = 1e-9
 
 
@@ -238,11 +239,21 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
         UnreachablePostureError: the robot cannot lean that far.
     """
     low, high = signal.extent
-    if max(abs(low), abs(high)) > 10.0:
-        raise InvalidInputError(
-            f"the reference goes from {low:g} m to {high:g} m. Give a signal in metres."
+    start, ground = float(stance.com[1]), min(p.translation[2] for p in stance.placements)
+    if max(abs(low), abs(high)) > stance.com[2] - ground:
+        raise UnreachablePostureError(
+            f"the reference leans from {low:g} m to {high:g} m, farther than the CoM of "
+            f"{stance.robot.name!r} is high ({stance.com[2] - ground:.2f} m). Give less, in metres."
         )
     low, high = min(low, -_SPACING), max(high, _SPACING)
-    start, count = float(stance.com[1]), math.ceil((high - low) / _SPACING) + 1
+    count = math.ceil((high - low) / _SPACING) + 1
+    if count > 5 * _COARSE:
+        # A lean far out of reach is told by a few postures, not by hundreds.
+        few = lateral_sweep(
+            stance, start + low, start + high, count // _COARSE + 1, com_x=float(stance.com[0])
+        )
+        for i in (0, len(few) - 1):
+            if i in few.failures:
+                raise UnreachablePostureError(few.failures[i])
     path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
     return PathReference(replace(path, values=path.values - start, coordinate="com_y"), signal)
