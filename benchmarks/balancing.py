@@ -65,20 +65,19 @@ def leans() -> list[str]:
         reach = 0.08 if "0.20" in posture else 0.055
         scores.append(score_lean(stance, criterion, reach, posture=posture))
     stance = copsense.load_stance("talos")
-    for criterion in (C1, C2):
-        scores.append(score_lean(stance, criterion, 0.13, posture="talos"))
+    scores += [score_lean(stance, criterion, 0.13, posture="talos") for criterion in (C1, C2)]
     table = score_table(scores)
     lines = [
         "| posture | criterion | tip, simulated [mm] | static path [mm] | first order [mm] | "
         "contact (predicted) | torque norm [Nm] |",
         "|---|---|---|---|---|---|---|",
     ]
-    for row in table.itertuples():
-        lines.append(
-            f"| {row.posture} | {row.controller} | {row.excursion * 1e3:.1f} | "
-            f"{row.predicted * 1e3:.1f} | {row.first_order * 1e3:.1f} | {row.contact} "
-            f"({row.predicted_contact}) | {row.torque_norm:.1f} |"
-        )
+    lines += [
+        f"| {row.posture} | {row.controller} | {row.excursion * 1e3:.1f} | "
+        f"{row.predicted * 1e3:.1f} | {row.first_order * 1e3:.1f} | {row.contact} "
+        f"({row.predicted_contact}) | {row.torque_norm:.1f} |"
+        for row in table.itertuples()
+    ]
     found = agreement(table)
     lines += [
         "",
