@@ -119,9 +119,9 @@ def sways(quick: bool) -> list[str]:
             f"{end if end == 'completed' else run.attrs['tip_contact'] + ' tips, then ' + end}, "
             f"{run.attrs['end_time']:.2f} s | "
             + (f"{float(run['tip_com'][1]) * 1e3:+.1f}" if np.isfinite(tip) else "none")
-            + f" | {np.sqrt(np.mean(error**2)):.1e}".replace("e-0", "e-")
-            + f" | {float(share.min()):.0f} to {float(share.max()):.0f} | "
-            f"{float(standing['margin'].min()) * 1e3:.2f} | {run.attrs['end_time'] / took:.2f} |"
+            + f" | {np.sqrt(np.mean(error**2)) * 1e3:.4f} | {float(share.min()):.0f} to "
+            f"{float(share.max()):.0f} | {float(standing['margin'].min()) * 1e3:.2f} | "
+            f"{run.attrs['end_time'] / took:.2f} |"
         )
     return lines
 

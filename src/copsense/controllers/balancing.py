@@ -20,8 +20,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import scipy.linalg
 from jaxtyping import Float
+from scipy.linalg import lapack
 
 from copsense.controllers.controller import Command, Observation
 from copsense.controllers.dynamics import StandingDynamics
@@ -101,17 +101,17 @@ class BalancingController:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Torques and stacked contact forces for a wrench on the base and postural torques."""
         M, h, J, bias = self._dynamics.M, self._dynamics.h, self._dynamics.J, self._dynamics.bias
-        base = scipy.linalg.cho_factor(M[:6, :6], check_finite=False)
-        solved = scipy.linalg.cho_solve(
-            base, np.column_stack([M[:6, 6:], base_wrench - h[:6]]), check_finite=False
-        )
+        right = np.empty((6, M.shape[1] - 5), order="F")
+        right[:, :-1], right[:, -1] = M[:6, 6:], base_wrench - h[:6]
+        solved = lapack.dposv(M[:6, :6], right)[1]
         T, w = solved[:, :-1], solved[:, -1]
         Ms = M[6:, 6:] - M[6:, :6] @ T
         Js = J[:, 6:] - J[:, :6] @ T
-        L = scipy.linalg.lapack.dpotrf(Ms, lower=1)[0]
+        L = lapack.dpotrf(Ms, lower=1)[0]
         # tau_0 compensates h_s, so that tau_0 - h_s is the posture's own torque.
-        right = np.column_stack([Js.T, posture])
-        scaled = scipy.linalg.lapack.dtrtrs(L, right, lower=1)[0]
+        right = np.empty((len(Ms), len(Js) + 1), order="F")
+        right[:, :-1], right[:, -1] = Js.T, posture
+        scaled = lapack.dtrtrs(L, right, lower=1)[0]
         Y, p = scaled[:, :-1], scaled[:, -1]
         mu = _solve(Y.T @ Y, -bias - J[:, :6] @ w - Y.T @ p)
         offset = h[6:] - T.T @ h[:6] + posture + Js.T @ mu
@@ -122,7 +122,7 @@ class BalancingController:
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve a symmetric system; the least solution where contacts are redundant."""
-    factor, info = scipy.linalg.lapack.dpotrf(matrix, lower=1)
+    factor, info = lapack.dpotrf(matrix, lower=1)
     if info == 0 and np.diag(factor).min() ** 2 > _RANK * np.abs(matrix).max():
-        return np.asarray(scipy.linalg.lapack.dpotrs(factor, right, lower=1)[0])
+        return np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])

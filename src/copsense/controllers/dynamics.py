@@ -77,6 +77,6 @@ class StandingDynamics:
         self, force: Float[np.ndarray, " 3"], moment: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, " 6"]:
         """A wrench about the centre of mass, world axes, as one on the base in its own axes."""
-        base = self.data.oMi[1]
-        about_base = moment + np.cross(self.com - base.translation, force)
-        return np.concatenate([base.rotation.T @ force, base.rotation.T @ about_base])
+        base = self.data.oMi[1].rotation
+        arm = pin.skew(self.com - self.data.oMi[1].translation)
+        return np.concatenate([base.T @ force, base.T @ (moment + arm @ force)])

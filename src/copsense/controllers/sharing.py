@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from jaxtyping import Float
+from scipy.linalg import lapack
 
 from copsense.criterion import Criterion
 from copsense.errors import UndeterminedWrenchError
@@ -58,7 +58,9 @@ class ShareByCriterion:
         self._levels = []
         level: Criterion | None = criterion
         while level is not None:
-            self._levels.append(level.at(stance))
+            quadratic = level.at(stance)
+            one = np.array_equal(quadratic.torque, np.eye(len(quadratic.torque)))
+            self._levels.append((quadratic, one and not quadratic.inertia))
             level = level.tie_break
 
     def __call__(self, problem: LoadProblem) -> Float[np.ndarray, " m"]:
@@ -68,23 +70,20 @@ class ShareByCriterion:
             UndeterminedWrenchError: the criterion and its tie-breaks leave several.
         """
         B, A = problem.base_map, problem.joint_map
-        Q, R = np.linalg.qr(B.T, mode="complete")
-        forces = Q[:, :6] @ scipy.linalg.solve_triangular(
-            R[:6], problem.base_wrench, trans="T", check_finite=False
-        )
-        Z = Q[:, 6:]
-        for quadratic in self._levels:
+        forces, Z = _allowed(B, problem.base_wrench)
+        for quadratic, plain in self._levels:
             W = quadratic.torque
             if quadratic.inertia:
                 W = W + quadratic.inertia * np.linalg.inv(problem.joint_inertia)
-            tau = problem.torque_offset - A @ forces
             AZ = A @ Z
             # Curvature and slope of the cost along Z.
-            H = AZ.T @ (W @ AZ) + Z.T @ quadratic.wrench @ Z
-            g = AZ.T @ (W @ tau) + Z.T @ (quadratic.pull - quadratic.wrench @ forces)
-            cholesky, info = scipy.linalg.lapack.dpotrf(H)
+            WAZ = AZ if plain else W @ AZ
+            H = AZ.T @ WAZ + Z.T @ (quadratic.wrench @ Z)
+            g = WAZ.T @ (problem.torque_offset - A @ forces)
+            g += Z.T @ (quadratic.pull - quadratic.wrench @ forces)
+            cholesky, info = lapack.dpotrf(H)
             if info == 0 and np.diag(cholesky).min() ** 2 > _NULL * np.abs(H).max():
-                return np.asarray(forces + Z @ scipy.linalg.lapack.dpotrs(cholesky, g)[0])
+                return np.asarray(forces + Z @ lapack.dpotrs(cholesky, g)[0])
             values, vectors = np.linalg.eigh(H)
             seen = values > _NULL * max(float(values[-1]), 1e-300)
             on = vectors[:, seen]
@@ -96,3 +95,19 @@ class ShareByCriterion:
             f"criterion {self.criterion.name!r} leaves {Z.shape[1]} direction(s) of the contact "
             "forces undetermined. Give it a tie_break such as minimum_wrench(1.0)."
         )
+
+
+def _allowed(
+    B: Float[np.ndarray, "6 m"], wrench: Float[np.ndarray, " 6"]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smallest forces with B f = wrench, and an orthonormal basis of those with B f = 0.
+
+    One Householder QR of B' gives both.
+    """
+    m = B.shape[1]
+    qr, tau, _, _ = lapack.dgeqrf(B.T)
+    full = np.zeros((m, m), order="F")
+    full[:, :6] = qr
+    Q, _, _ = lapack.dorgqr(full, np.concatenate([tau, np.zeros(m - 6)]))
+    y, _ = lapack.dtrtrs(qr[:6], wrench, trans=1)
+    return Q[:, :6] @ y, Q[:, 6:]

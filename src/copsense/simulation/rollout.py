@@ -59,6 +59,7 @@ def rollout(
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
     stance, dt = simulator.stance, simulator.time_step
     robot, name = stance.robot, controller_name(controller)
+    n = len(robot.torque_names)
     scenario.check_robot(robot)
     steps = scenario.steps_per_control(dt)
     reference = scenario.reference
@@ -82,7 +83,7 @@ def rollout(
         q, v = sensors.read(now)
         try:
             observation = Observation(time, q, v, target, now.wrenches)
-            command = ask(controller, observation, len(robot.torque_names))
+            command = ask(controller, observation, n)
             here = now
             for _ in range(steps):
                 torques = actuation.apply(command.torques)

@@ -92,8 +92,9 @@ class Watch:
 
     def tilts(self, now: Snapshot) -> np.ndarray:
         """Angle of each contact frame's z axis from its plane's normal (nc,) [rad]."""
-        across = np.linalg.norm(np.cross(now.rotations[:, :, 2], self._normals), axis=1)
-        along = np.einsum("ij,ij->i", now.rotations[:, :, 2], self._normals)
+        z = now.rotations[:, :, 2]
+        along = np.einsum("ij,ij->i", z, self._normals)
+        across = np.linalg.norm(z - along[:, None] * self._normals, axis=1)
         return np.where(self._turns, np.arctan2(across, along), 0.0)
 
     def com(self, now: Snapshot) -> np.ndarray:
