@@ -129,15 +129,15 @@ def sways(quick: bool) -> list[str]:
 def pushes() -> list[str]:
     """The least lateral push that tips a foot."""
     lines = [
-        "| posture | criterion | first-tip impulse [N s] | contact |",
-        "|---|---|---|---|",
+        "| posture | criterion | first-tip impulse [N s] | predicted [N s] | ratio | contact |",
+        "|---|---|---|---|---|---|",
     ]
     stance = icub()
     for criterion in tqdm((C1, C2), desc="pushes", disable=None):
-        score = score_impulse(stance, criterion, posture="straight")
+        score = score_impulse(stance, criterion, posture="straight", largest=4, resolution=0.03)
         lines.append(
             f"| straight | {criterion.name} | {score.impulse:.2f} ± {score.resolution:.2f} | "
-            f"{score.contact} |"
+            f"{score.predicted:.2f} | {score.impulse / score.predicted:.2f} | {score.contact} |"
         )
     return lines
 

@@ -26,10 +26,11 @@ from copsense.controllers import (
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.simulation import MujocoSimulator, PhysicsSettings, Push, Scenario, rollout
-from copsense.simulation.prediction import predict
+from copsense.simulation.prediction import predict, predict_lean
 from copsense.stance import Stance
 
 _AFTER = 1.0  # s to watch after a push
+_LEAN = 0.12  # of the CoM's height: how far to look for the first edge
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ class ImpulseScore:
         impulse: half-way between the largest push that tipped nothing and the smallest that did
             [N s]; NaN where not even the largest tried did.
         resolution: half the distance between these two [N s].
+        predicted: `predict_impulse` from the static excursion [N s].
         contact: which contact tipped at the smallest.
         runs: how many rollouts it took.
     """
@@ -121,6 +123,7 @@ class ImpulseScore:
     controller: str
     impulse: float
     resolution: float
+    predicted: float
     contact: str
     runs: int
 
@@ -153,6 +156,8 @@ def score_impulse(
     simulator = MujocoSimulator(stance)
     controller = BalancingController(stance, criterion, gains)
     reference = lateral_reference(stance, Hold())
+    lean = predict_lean(stance, criterion, _LEAN * float(stance.com[2]))
+    predicted = predict_impulse(stance, lean.excursion, duration, gains)
     runs, tipped = 0, ""
 
     def tips(impulse: float) -> str:
@@ -167,7 +172,7 @@ def score_impulse(
     low, high = 0.0, largest
     tipped, runs = tips(high), 1
     if not tipped:
-        return ImpulseScore(posture, criterion.name, np.nan, np.nan, "", runs)
+        return ImpulseScore(posture, criterion.name, np.nan, np.nan, predicted, "", runs)
     while high - low > 2 * resolution:
         middle = (low + high) / 2
         found, runs = tips(middle), runs + 1
@@ -175,7 +180,41 @@ def score_impulse(
             high, tipped = middle, found
         else:
             low = middle
-    return ImpulseScore(posture, criterion.name, (low + high) / 2, (high - low) / 2, tipped, runs)
+    return ImpulseScore(
+        posture, criterion.name, (low + high) / 2, (high - low) / 2, predicted, tipped, runs
+    )
+
+
+def predict_impulse(
+    stance: Stance, excursion: float, duration: float, gains: Gains = STIFF
+) -> float:
+    """The least lateral push that tips a contact, by the static excursion and no fitted number.
+
+    The CoM is a mass m under the controller's law, a = -kp y - kd v + F/m, and acts on the soles
+    as if it stood at rest at y + (h/g)(kp y + kd v): there is where the static analysis is asked.
+
+    Args:
+        stance: gives mass and height of the CoM.
+        excursion: the static excursion d to the first tip [m].
+        duration: of the push [s].
+        gains: their lateral kp and kd.
+
+    Returns:
+        The impulse F * duration [N s].
+    """
+    kp, kd = gains.com_stiffness[1], gains.com_damping[1]
+    ground = float(np.mean([place.translation[2] for place in stance.placements]))
+    g = stance.robot.weight / stance.robot.mass
+    lever = (float(stance.com[2]) - ground) / g
+    dt = 1e-4
+    y = v = most = 0.0
+    for i in range(round((duration + _AFTER) / dt)):
+        # Of a unit impulse.
+        push = 1.0 / (stance.robot.mass * duration) if i * dt < duration else 0.0
+        v += dt * (push - kp * y - kd * v)
+        y += dt * v
+        most = max(most, y + lever * (kp * y + kd * v))
+    return excursion / most
 
 
 def score_table(scores: Iterable[LeanScore | ImpulseScore]) -> pd.DataFrame:

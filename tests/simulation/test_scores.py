@@ -38,6 +38,7 @@ def test_the_first_tip_impulse_has_its_resolution():
     score = score_impulse(narrow(), C1, largest=8.0, resolution=1.0)
     assert score.resolution <= 1.0
     assert 0 < score.impulse < 8.0
+    assert score.impulse - score.resolution < 1.5 * score.predicted
     assert score.contact
     none = score_impulse(narrow(), C1, largest=0.01)
     assert np.isnan(none.impulse)

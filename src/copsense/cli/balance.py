@@ -224,11 +224,13 @@ def _read_torque_limits(texts: tuple[str, ...]) -> Any:
 
 
 def _summary(recording: Any) -> dict[str, Any]:
-    """What a person wants to know of a run."""
+    """What a person wants to know of a run; tracking and torques are those before a tip."""
     attributes = recording.attrs
-    error = (recording["com"] - recording["com_target"]).sel(com_axis="y").values
-    loaded = recording["margin"].min("time")
-    torque = (recording["torque"] ** 2).sum("joint") ** 0.5
+    tip_time = attributes["tip_time"]
+    standing = recording.sel(time=slice(None, tip_time if math.isfinite(tip_time) else None))
+    error = (standing["com"] - standing["com_target"]).sel(com_axis="y").values
+    loaded = standing["margin"].min("time")
+    torque = (standing["torque"] ** 2).sum("joint") ** 0.5
     tip_y = float(recording["tip_com"].sel(com_axis="y"))
     start = float(recording["com"].sel(com_axis="y")[0])
     return {
@@ -246,7 +248,7 @@ def _summary(recording: Any) -> dict[str, Any]:
             for name, value in zip(loaded["contact"].values, loaded.values, strict=True)
         },
         "torque_norm_mean": float(torque.mean()),
-        "torque_peak": float(abs(recording["torque"]).max()),
+        "torque_peak": float(abs(standing["torque"]).max()),
         "first_tip": None
         if not attributes["tip_kind"]
         else {

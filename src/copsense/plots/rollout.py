@@ -77,6 +77,8 @@ def _draw_forces(ax: Axes, dataset: xr.Dataset, colour: dict[str, str]) -> None:
     share = dataset["wrench"].sel(component="fz") / float(dataset.attrs["weight"]) * 100
     for name, c in colour.items():
         ax.plot(dataset["time"], share.sel(contact=name), color=c)
+    most = float(np.nanmax(share.values[_standing(dataset)]))
+    ax.set_ylim(-5.0, 1.15 * max(most, 10.0))  # the blows of a fall would press the rest flat
     ax.set_ylabel("normal force [% of the weight]")
     put_legend(ax, _handles(colour))
 
@@ -112,15 +114,15 @@ def _limit(ax: Axes, dataset: xr.Dataset) -> None:
 
 
 def _draw_above(ax: Axes, dataset: xr.Dataset, colour: dict[str, str]) -> None:
-    cops = _world_cop(dataset, "cop")
+    rows = _standing(dataset)
+    cops, margin = _world_cop(dataset, "cop")[rows], dataset["margin"].values[rows]
     draw_ground(ax, world_soles(dataset), contact_origins(dataset))
-    margin = dataset["margin"].values
     for k, c in enumerate(colour.values()):
         draw_track(ax, cops[:, k], ~(margin[:, k] < 0), c, 2.4)
-    com = dataset["com"].values[:, :2] * MM
+    com = dataset["com"].values[rows, :2] * MM
     ax.plot(com[:, 1], com[:, 0], zorder=4, **COM_LINE)
     frame_ground(ax, world_soles(dataset), contact_origins(dataset), com)
-    ax.set_title("from above")
+    ax.set_title("from above, before a tip")
 
 
 def _draw_com(ax: Axes, dataset: xr.Dataset) -> None:

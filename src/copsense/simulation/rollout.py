@@ -107,7 +107,8 @@ def rollout(
         if ends:
             end = ends
             if tip and tip is not ends:  # what came of it
-                end = replace(ends, message=f"{tip.message}; then {ends.message}")
+                then = ends.message.partition(";")[0]
+                end = replace(ends, message=f"{tip.message}; then {then}")
             break
         if progress and number - reported >= _REPORT:
             progress(number - reported)
