@@ -1,5 +1,6 @@
 """What cannot be run says so; what goes wrong on the way is kept, with its reason and time."""
 
+import pickle
 import sys
 from dataclasses import replace
 from unittest.mock import patch
@@ -28,6 +29,7 @@ from copsense.simulation import (
     Push,
     Scenario,
     Simulator,
+    SimulatorStoppedError,
     rollout,
 )
 from copsense.simulation.actuation import Actuation
@@ -218,6 +220,12 @@ def test_motors_delay_filter_and_limit():
     torques = weak.apply(one)
     assert torques[robot.torque_names.index("l_knee")] == 0.5
     assert np.sum(torques == 1.0) == N - 1
+
+
+def test_a_stop_survives_a_copy():
+    stop = SimulatorStoppedError("told to", 0.3)
+    again = pickle.loads(pickle.dumps(stop))
+    assert (str(again), vars(again)) == (str(stop), vars(stop))
 
 
 def test_noise_is_seeded():

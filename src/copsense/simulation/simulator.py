@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -47,6 +47,10 @@ class SimulatorStoppedError(CopsenseError):
         """Store the time beside the reason."""
         self.reason, self.time = reason, time
         super().__init__(f"{reason}, at {time:.3f} s")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built from the data, not from the message."""
+        return type(self), (self.reason, self.time)
 
 
 @runtime_checkable
