@@ -128,7 +128,8 @@ def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, 
     """
     array = finite_array(points, f"the polygon of contact {label!r}", (None, 2), "x, y [m]")
     # Andrew's monotone chain: no dependency on a hull that refuses flat input.
-    ordered = [tuple(p) for p in np.unique(array, axis=0)]
+    # Rounded to the picometre: noise in x would put the points of an upright edge out of order.
+    ordered = [tuple(p) for p in np.unique(np.round(array, 12) + 0.0, axis=0)]
     _require(
         len(ordered) >= 2,
         f"the polygon of contact {label!r} is a single point. Give two or more, or make the "

@@ -152,6 +152,10 @@ class InfeasibleError(CopsenseError):
             "one of these limits, or move the posture."
         )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.violation, self.demands)
+
 
 class UnsolvedError(CopsenseError):
     """A quadratic program that has solutions was not solved well enough to be believed.
@@ -168,3 +172,7 @@ class UnsolvedError(CopsenseError):
             "condition remains. Weights of very different size, or limits that all but exclude "
             "each other, can cause this; bring the weights nearer or relax a limit."
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.error,)

@@ -297,13 +297,16 @@ def _unit_cone(
         for t in angles
     ]
     array = np.array(points)
-    # Where Qhull takes little friction for a flat direction, each axis in its own size helps.
-    for size in (np.ones(5), np.abs(array).max(axis=0)):
+    # Where Qhull takes little friction for a flat direction, each axis in its own size helps; where
+    # rounding has it merge facets of so regular a section wrongly, looking from elsewhere does.
+    own_size = np.diag(1.0 / np.abs(array).max(axis=0))
+    turns = np.random.default_rng(0).normal(size=(4, 5, 5))
+    for view in (np.eye(5), own_size, *(np.linalg.qr(turn)[0] @ own_size for turn in turns)):
         try:
-            faces = np.unique(np.round(ConvexHull(array / size).equations, 12), axis=0)
+            faces = np.unique(np.round(ConvexHull(array @ view.T).equations, 12), axis=0)
         except QhullError:
             continue
-        faces[:, :5] /= size
+        faces[:, :5] = faces[:, :5] @ view
         faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
         if (array @ faces[:, :5].T + faces[:, 5]).max() < _ROUNDING:
             return tuple(np.insert(face[:5], 2, face[5]) for face in faces)

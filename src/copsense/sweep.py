@@ -273,6 +273,9 @@ def _dataset(
         "coordinate": coordinate,
         "contact_frames": ", ".join(c.frame for c in stance.contacts),
         "contact_kinds": ", ".join(c.kind for c in stance.contacts),
+        "without_sole": ", ".join(
+            c.name for c in stance.contacts if c.kind != "point" and c.polygon is None
+        ),
         "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
         "the robot, force first; base velocity in the base's frame",
     }

@@ -13,7 +13,7 @@ import pinocchio as pin
 import piqp
 import scipy.optimize
 import scipy.sparse
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 
 @dataclass(frozen=True)
@@ -146,10 +146,16 @@ def wrench_cone(polygon, mu, sides):
     points = generators(polygon, mu, sides)[:, [0, 1, 3, 4, 5]]
     middle = points.mean(axis=0)
     _, size, axes = np.linalg.svd(points - middle, full_matrices=False)
-    hull = ConvexHull((points - middle) @ axes.T / size)
-    normals = hull.equations[:, :5] / size @ axes
-    offsets = hull.equations[:, 5] - normals @ middle
-    return np.insert(normals, 2, offsets, axis=1)
+    turns = np.random.default_rng(1).normal(size=(8, 5, 5))
+    for turn in (np.eye(5), *(np.linalg.qr(turn)[0] for turn in turns)):
+        try:
+            hull = ConvexHull((points - middle) @ axes.T / size @ turn.T)
+        except QhullError:  # rounding merges facets of so regular a section: look from elsewhere
+            continue
+        normals = hull.equations[:, :5] @ turn / size @ axes
+        offsets = hull.equations[:, 5] - normals @ middle
+        return np.insert(normals, 2, offsets, axis=1)
+    raise AssertionError("no view of the cone's section could be hulled")
 
 
 def joint_bounds(stance, torque):

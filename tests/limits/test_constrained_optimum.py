@@ -81,7 +81,7 @@ def test_wrenches_are_an_independent_solvers(stance_of, robot):
 def test_infeasible_by_as_much_as_said(stance_of, robot):
     # With every limit relaxed by the violation there is a wrench; by a little less there is none.
     seen = 0
-    for case, found in solved(stance_of(robot), 100 + ROBOTS.index(robot), 6):
+    for case, found in solved(stance_of(robot), 100 + ROBOTS.index(robot), 30):
         if not isinstance(found, InfeasibleError):
             continue
         seen += 1
@@ -93,6 +93,8 @@ def test_infeasible_by_as_much_as_said(stance_of, robot):
         # The limits named are the conflict: nothing else is needed for it.
         assert not relaxed(case, 0.9 * found.violation, among=found.demands)
         assert found.demands[0] in str(found)
+        if seen == 6:
+            break
     assert seen >= 3
 
 

@@ -58,7 +58,7 @@ SPOILS = (nothing_active, all_active, one_more, one_less, iteration_limit, infea
 def pressed(stance_of):
     """Problems in which at least one limit presses."""
     found, rng = [], np.random.default_rng(11)
-    while len(found) < 40:
+    while len(found) < 24:
         stance = random_stance(stance_of(("icub", "talos", "solo12")[len(found) % 3]), rng)
         for _ in range(4):
             case = random_case(stance, rng)

@@ -49,8 +49,6 @@ def main() -> None:
         sys.exit(code)
     except CopsenseError as error:
         click.echo(f"error: {error}", err=True)
-    except click.UsageError as error:
-        error.show()
     except click.ClickException as error:
         error.show()
     except (click.Abort, KeyboardInterrupt):

@@ -116,6 +116,12 @@ def read_stance(
     """The stance that the options of `stance_options` describe."""
     from copsense.robots import PRESETS, load_robot, load_stance
 
+    if sole_height is not None:
+        if contact_at == "sole":
+            raise InvalidInputError(
+                "--sole-height and --contact-at sole both say where the contacts are. Give one."
+            )
+        contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
     source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
     angles = {joint: math.radians(deg) for joint, deg in read_assignments(posture).items()}

@@ -139,7 +139,7 @@ def _read_path(
 
     if configurations is not None:
         rows = load_configurations(configurations)
-        return path_through(stance.at(rows[0]), rows)
+        return path_through(stance.at(rows[0]), rows, strict=False)
     name, _, text = ("", "", com_y) if com_y is not None else str(joint).partition("=")
     start, stop, count = read_range(text)
     with progress_bar(max(count, 0), "postures") as update:
@@ -176,6 +176,7 @@ def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str,
         "output": output,
         "criteria": criteria,
         "limits": dataset.attrs.get("limits"),
+        "without_sole": dataset.attrs["without_sole"],
     }
 
 
@@ -199,6 +200,8 @@ def _print(summary: dict[str, Any]) -> None:
     click.echo(f"{summary['robot']}: {summary['postures']} postures along {summary['coordinate']}")
     for name, row in summary["criteria"].items():
         word = "no limit active" if summary["limits"] else "every contact planted"
+        if summary["without_sole"] and not summary["limits"]:
+            word = "every contact pushes"
         if row["planted"] is None:
             planted = f"{word} at no posture"
         else:
@@ -207,5 +210,11 @@ def _print(summary: dict[str, Any]) -> None:
         if math.isfinite(row["smallest_margin"]):
             planted += f"; smallest margin on the way {row['smallest_margin'] * 1e3:+.1f} mm"
         click.echo(f"  {name}: {planted}")
+    if summary["without_sole"]:
+        click.echo(
+            f"note: no sole is known under {summary['without_sole']}, so when it tips is not "
+            "either: give --sole X0:X1:Y0:Y1.",
+            err=True,
+        )
     if summary["output"]:
         click.echo(f"written: {summary['output']}")

@@ -15,12 +15,15 @@ BALANCE = 1e-6  # share of the weight by which wrenches may miss the balance
 WrenchLaw = Callable[[np.ndarray], np.ndarray]
 
 
-def wrench_law(torques: Callable[[np.ndarray], np.ndarray], stance: Stance) -> WrenchLaw:
+def wrench_law(
+    torques: Callable[[np.ndarray], np.ndarray], stance: Stance, *, name: str | None = None
+) -> WrenchLaw:
     """The wrenches that a user's static torques cause, as a law ([Romano2016] Eq. (9)).
 
     Args:
         torques: callable q -> joint torques (n,) that hold the robot at rest.
         stance: gives robot and contacts.
+        name: how the law is called in results; default the callable's own name.
 
     Raises:
         UndeterminedWrenchError: no torque can feel some wrenches (redundant contacts).
@@ -41,6 +44,7 @@ def wrench_law(torques: Callable[[np.ndarray], np.ndarray], stance: Stance) -> W
         # J' f = G - B tau: consistent where the torques hold the robot, so any inverse serves.
         return here.unstack(np.linalg.lstsq(here.jacobian.T, balance, rcond=None)[0])
 
+    law.__name__ = name or law_name(torques)
     return law
 
 

@@ -27,7 +27,7 @@ from copsense.errors import CopsenseError, UnsolvedError
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
-_ZERO = 1e-12  # norm of a row that limits nothing, relative size of an entry that is none
+_ZERO = 1e-12  # norm of a row that limits nothing
 _FAR = 1e4  # units: no x is looked for farther out
 _UNBOUNDED = 1e30  # as the solver writes infinity
 
@@ -257,13 +257,12 @@ class Program:
 
     def _conflict(self) -> tuple[float, np.ndarray]:
         """The least violation of all rows that leaves a point, and the rows that demand it."""
-        A, k = self.A @ self.null, self.null.shape[1]
-        # What rounding leaves of a zero must not become a way out, at 1e12 times the unit.
-        A[np.abs(A) < _ZERO * np.linalg.norm(self.A, axis=1, keepdims=True)] = 0.0
+        N, k = self.null, self.null.shape[1]
+        # Bounded, or what rounding leaves of a zero becomes a way out at 1e9 times the unit.
         far = _FAR * self.unit
         found = scipy.optimize.linprog(
             np.eye(k + 1)[k],
-            A_ub=np.column_stack([A, -np.ones(len(self.b))]),
+            A_ub=np.column_stack([self.A @ N, -np.ones(len(self.b))]),
             b_ub=self.b - self.A @ self.start,
             bounds=[(-far, far)] * k + [(0, None)],
         )
