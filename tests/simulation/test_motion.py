@@ -28,7 +28,7 @@ def ramp(criterion, distance, *, stance=None, engine=None, **options):
     )
 
 
-# [balancing.md] 31.1 and 41.5 mm; criterion 2's depends on the posture cost along the path.
+# Criterion 2's limit depends on the posture cost along the path; criterion 1's does not.
 @pytest.mark.parametrize(("criterion", "near"), [(C1, 31.1e-3), (C2, 40e-3)], ids=["C1", "C2"])
 def test_the_first_tip_is_where_the_static_analysis_says(criterion, near):
     prediction = predict_lean(icub(), criterion, 0.05)
