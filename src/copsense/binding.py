@@ -10,7 +10,7 @@ from jaxtyping import Float
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.margins import limit_travel
-from copsense.posture import solve_posture
+from copsense.motion import lateral_posture
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 
@@ -54,12 +54,9 @@ def first_binding(
     first = limit_travel(stance, criterion, limits, direction, reach=reach).first
     if first is None or first.exact is None:
         return None
-    planar = stance.robot.base_nv != 6
     y = float(stance.com[1]) + direction * first.exact
-    com = (None if planar else float(stance.com[0]), y, None)
-    posture = solve_posture(stance, com=com, reference=stance.q)
-    tangent = direction * posture.tangents[:, 0 if planar else 1]
-    there = cop_sensitivity(posture.stance, criterion, limits)
+    here, tangent = lateral_posture(stance, y)
+    there = cop_sensitivity(here, criterion, limits)
     # Along the direction of travel; turned back to world +y.
-    before, after = (direction * side for side in there.one_sided(tangent))
+    before, after = (direction * side for side in there.one_sided(direction * tangent))
     return FirstBinding(criterion.name, first.margin.name, y, before, after)

@@ -146,11 +146,7 @@ def foot_rotation_indicator(
         shape, meaning = (len(names), 6), "in contact axes, force first"
         others = finite_array(other_wrenches, "other_wrenches", shape, meaning).copy()
         others[k] = 0.0
-        world = [
-            np.concatenate([p.rotation @ w[:3], p.rotation @ w[3:]])
-            for p, w in zip(stance.placements, others, strict=True)
-        ]
-        taken_f, taken_m = _resultant(stance, np.array(world))
+        taken_f, taken_m = _resultant(stance, stance.in_world_axes(others))
         force, moment = force - taken_f, moment - taken_m
     return center_of_pressure(force, moment, plane)
 

@@ -20,7 +20,7 @@ from copsense.criterion import (
 )
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.limits import Limits
-from copsense.margins import margin_table
+from copsense.margins import MarginTable
 from copsense.motion import Path
 from copsense.posture import supporting_joints
 from copsense.sensitivity import cop_sensitivity
@@ -208,7 +208,7 @@ def score(
         CopsenseError: the criterion fails at a posture of the path.
     """
     middle = len(path) // 2
-    table = margin_table(path.stances[middle], limits)
+    table = MarginTable(path.stances[middle], limits)
     rows, gains, norms = [], [], []
     for stance in path.stances:
         result = cop_sensitivity(stance, criterion)

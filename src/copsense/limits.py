@@ -8,7 +8,7 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull, QhullError
 
@@ -103,6 +103,7 @@ class LimitRows:
         contacts: index of the contact of each row (r,).
         kinds: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"`` or ``"wrench cone"``.
         torque: limit of the size of each joint's torque (n,) [Nm]; infinite where there is none.
+        joints: name of each of these joints (n,).
     """
 
     matrix: Float[np.ndarray, "r m"]
@@ -111,6 +112,34 @@ class LimitRows:
     contacts: tuple[int, ...]
     kinds: tuple[str, ...]
     torque: Float[np.ndarray, " n"]
+    joints: tuple[str, ...]
+
+    @property
+    def joint(self) -> Int[np.ndarray, " k"]:
+        """Joint of each torque row (k,): two rows, s tau <= t, for each joint with a limit."""
+        return np.repeat(np.flatnonzero(np.isfinite(self.torque)), 2)
+
+    @property
+    def sign(self) -> Float[np.ndarray, " k"]:
+        """The sign s of each torque row (k,): +1, -1 in turn."""
+        return np.tile([1.0, -1.0], len(self.joint) // 2)
+
+    @property
+    def torque_names(self) -> tuple[str, ...]:
+        """What each torque row limits (k,)."""
+        return tuple(f"torque of {self.joints[i]}" for i in self.joint)
+
+    def over_forces(
+        self, stance: Stance
+    ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:
+        """A and b of A f <= b with the torque rows after the contacts': tau = G_j - J_j' f.
+
+        s tau_i <= t_i is the row -s J_i' f <= t_i - s G_i.
+        """
+        nb, joint, s = stance.robot.base_nv, self.joint, self.sign
+        Jj, Gj = stance.jacobian[:, nb:].T[joint], stance.gravity[nb:][joint]
+        A = np.vstack([self.matrix, -s[:, None] * Jj])
+        return A, np.concatenate([self.bound, self.torque[joint] - s * Gj])
 
 
 def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
@@ -139,6 +168,7 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
         tuple(contacts),
         tuple(kinds),
         torque_limits(stance, limits.torque),
+        stance.robot.torque_names,
     )
 
 
@@ -148,9 +178,8 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
     if limits is None:
         return np.full(len(names), np.inf)
     if isinstance(limits, str):
-        model = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :].copy()
-        model[~((model > 0) & (model < PLACEHOLDER_TORQUE))] = np.inf
-        return model
+        model = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :]
+        return np.where((model > 0) & (model < PLACEHOLDER_TORQUE), model, np.inf)
     if isinstance(limits, Mapping):
         for joint in limits:
             if joint not in names:
@@ -161,9 +190,8 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
 
 def torque_placeholders(stance: Stance) -> tuple[str, ...]:
     """Joints whose effort limit in the model is a placeholder: none, zero, or absurdly large."""
-    limits = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :]
-    real = (limits > 0) & (limits < PLACEHOLDER_TORQUE)
-    return tuple(n for n, ok in zip(stance.robot.torque_names, real, strict=True) if not ok)
+    limits = torque_limits(stance, "model")
+    return tuple(n for n, t in zip(stance.robot.torque_names, limits, strict=True) if np.isinf(t))
 
 
 Row = tuple[str, str, Float[np.ndarray, " 6"], float]

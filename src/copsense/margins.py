@@ -14,7 +14,7 @@ from copsense.criterion import Criterion
 from copsense.equilibrium import StaticEquilibrium, solve_equilibrium
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits, limit_rows
-from copsense.posture import solve_posture
+from copsense.motion import lateral_posture
 from copsense.stance import Stance
 
 _UNITS = {"cop": "m", "torsion": "N m", "torque": "N m"}
@@ -79,7 +79,7 @@ class Travel:
 
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
-    table = margin_table(equilibrium.stance, limits)
+    table = MarginTable(equilibrium.stance, limits)
     values = table.values(equilibrium.forces, equilibrium.torques)
     return tuple(table.margin(rows, values) for rows in table.groups)
 
@@ -111,23 +111,21 @@ def limit_travel(
     """
     if direction not in (1, -1):
         raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    table = margin_table(stance, limits)
-    planar = stance.robot.base_nv != 6
-    x, y0 = None if planar else float(stance.com[0]), float(stance.com[1])
+    table = MarginTable(stance, limits)
+    y0 = float(stance.com[1])
 
     def at(y: float, near: Stance) -> tuple[Stance, np.ndarray]:
-        here = solve_posture(near, com=(x, y, None), reference=stance.q).stance
+        here, _ = lateral_posture(stance, y, near=near)
         solved = solve_equilibrium(here, criterion)
         return here, table.values(solved.forces, solved.torques)
 
-    start = solve_posture(stance, com=(x, y0, None))
-    tangent = start.tangents[:, 0 if planar else 1]
-    begin = solve_equilibrium(start.stance, criterion)
+    start, tangent = lateral_posture(stance, y0)
+    begin = solve_equilibrium(start, criterion)
     values = table.values(begin.forces, begin.torques)
     df, dtau = (d[:, 0] for d in begin.derivative(tangent[:, None]))
     rates = table.rates(begin, values, df, dtau) * direction
 
-    walked: list[tuple[float, Stance, np.ndarray]] = [(0.0, start.stance, values)]
+    walked: list[tuple[float, Stance, np.ndarray]] = [(0.0, start, values)]
     for step in np.linspace(0.0, reach, samples + 1)[1:]:
         try:
             walked.append((float(step), *at(y0 + direction * float(step), walked[-1][1])))
@@ -167,13 +165,10 @@ def _first_crossing(
     return None
 
 
-def margin_table(stance: Stance, limits: Limits) -> MarginTable:
-    """The rows of limits at a stance, to be evaluated at many equilibria of its path."""
-    return MarginTable(stance, limits)
-
-
 class MarginTable:
     """Rows of limits in their own units, grouped by contact or joint and kind.
+
+    Made once, it serves every equilibrium of a path.
 
     Attributes:
         names: what each row limits (r,).
@@ -186,15 +181,12 @@ class MarginTable:
         """Lay the rows out."""
         rows = limit_rows(stance, limits)
         self.contact_rows, self.fz = rows, _normal_rows(stance)
-        joints = np.flatnonzero(np.isfinite(rows.torque))
-        self.joint = np.repeat(joints, 2)
-        self.sign = np.tile([1.0, -1.0], len(joints))
+        self.joint, self.sign = rows.joint, rows.sign
         self.limit = rows.torque[self.joint]
-        names = stance.robot.torque_names
-        self.names = rows.names + tuple(f"torque of {names[i]}" for i in self.joint)
+        self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(self.joint)
         self.where = tuple(stance.contact_names[k] for k in rows.contacts) + tuple(
-            names[i] for i in self.joint
+            rows.joints[i] for i in self.joint
         )
         self.is_cop = np.array([kind == "cop" for kind in rows.kinds], dtype=bool)
         self.row_fz = self.fz[np.array(rows.contacts, dtype=int)]

@@ -88,6 +88,22 @@ def lateral_sweep(
     return _sweep(stance, "com_y", "m", values, float(stance.com[1]), request, column, progress)
 
 
+def lateral_posture(
+    stance: Stance, y: float, *, near: Stance | None = None
+) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    """The posture of a stance's lateral path at one CoM y, and dq/dy there.
+
+    Args:
+        stance: the posture that the path stays nearest to; its CoM x is held.
+        y: world y of the CoM [m].
+        near: where to start the search; default `stance`.
+    """
+    planar = stance.robot.base_nv != 6
+    com = (None if planar else float(stance.com[0]), y, None)
+    found = solve_posture(near or stance, com=com, reference=stance.q)
+    return found.stance, found.tangents[:, 0 if planar else 1]
+
+
 def joint_sweep(
     stance: Stance,
     joint: str,

@@ -217,6 +217,14 @@ class Stance:
             wrenches[k, list(contact.components)] = forces[rows]
         return wrenches
 
+    def in_world_axes(self, wrenches: Float[np.ndarray, "nc 6"]) -> Float[np.ndarray, "nc 6"]:
+        """Wrenches given in contact axes, in world axes about the same points."""
+        turned = [
+            np.concatenate([place.rotation @ w[:3], place.rotation @ w[3:]])
+            for place, w in zip(self.placements, wrenches, strict=True)
+        ]
+        return np.array(turned)
+
     def joint_wrenches(self, forces: Float[np.ndarray, " m"]) -> list[pin.Force]:
         """Stacked forces as one spatial force per joint of the model, in the joint's frame."""
         external = [pin.Force.Zero() for _ in range(self.robot.model.njoints)]

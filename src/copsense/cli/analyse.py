@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.options import (
+    criterion_options,
     echo_json,
     read_assignments,
     read_criteria,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     epilog="Example: copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png"
 )
 @stance_options
+@criterion_options
 @click.option("--com-x", type=float, metavar="M", help="World x of the CoM; default held.")
 @click.option("--com-y", type=float, metavar="M", help="World y of the CoM; default the middle.")
 @click.option(

@@ -53,8 +53,6 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, with the Pareto set.")
 def design(
     robot: str,
-    criteria: tuple[str, ...],
-    characteristic_length: float,
     limits: str | None,
     family: str,
     objective: Any,
@@ -72,7 +70,6 @@ def design(
     from copsense.limits import Limits
     from copsense.motion import lateral_sweep
 
-    del criteria, characteristic_length  # the family decides
     within = read_limits(limits) or Limits()
     start, stop, count = read_range(com_y)
     stance = read_stance(robot, **options)

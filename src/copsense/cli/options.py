@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def stance_options(command: F) -> F:
-    """The robot and how it stands."""
+    """The robot, how it stands, and what it must respect."""
     options = [
         click.argument("robot"),
         click.option(
@@ -73,6 +73,21 @@ def stance_options(command: F) -> F:
         ),
         click.option("--width", type=float, metavar="M", help="Distance between two feet [m]."),
         click.option(
+            "--limits",
+            metavar="NAME=VALUE,...",
+            help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+            "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+            "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+            "friction); off switches one off. Example: friction=0.33,torque=model.",
+        ),
+    ]
+    return _with(options, command)
+
+
+def criterion_options(command: F) -> F:
+    """Which criteria share the load."""
+    options = [
+        click.option(
             "--criterion",
             "criteria",
             multiple=True,
@@ -88,15 +103,11 @@ def stance_options(command: F) -> F:
             metavar="M",
             help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
         ),
-        click.option(
-            "--limits",
-            metavar="NAME=VALUE,...",
-            help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
-            "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
-            "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
-            "friction); off switches one off. Example: friction=0.33,torque=model.",
-        ),
     ]
+    return _with(options, command)
+
+
+def _with(options: Sequence[Callable[[Any], Any]], command: F) -> F:
     for option in reversed(options):
         command = option(command)
     return command

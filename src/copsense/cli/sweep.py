@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.options import (
+    criterion_options,
     echo_json,
     progress_bar,
     read_criteria,
@@ -33,6 +34,7 @@ _OVER_LIMIT = 1e-6  # rad: less is rounding
     "--criterion minimum-torque --output icub.nc"
 )
 @stance_options
+@criterion_options
 @click.option(
     "--com-y",
     metavar="START:STOP:COUNT",

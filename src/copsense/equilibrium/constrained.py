@@ -183,20 +183,12 @@ class _Problem:
         self.H = self.Jj @ self.W @ self.Jj.T + self.quadratic.wrench
         self.g = self.Jj @ self.W @ self.Gj + self.quadratic.pull
         rows: LimitRows = limit_rows(stance, limits)
-        limited = np.flatnonzero(np.isfinite(rows.torque))
-        names = stance.robot.torque_names
-        # s tau_i <= t_i for s = +1, -1: the row is -s J_i' f <= t_i - s G_i.
-        self.joint = np.concatenate([np.full(len(rows.bound), -1), np.repeat(limited, 2)])
-        self.sign = np.concatenate([np.zeros(len(rows.bound)), np.tile([1.0, -1.0], len(limited))])
-        torque = self.joint >= 0
-        J = self.Jj.T[self.joint[torque]]
-        s = self.sign[torque]
-        self.A = np.vstack([rows.matrix, -s[:, None] * J])
-        self.b = np.concatenate(
-            [rows.bound, rows.torque[self.joint[torque]] - s * self.Gj[self.joint[torque]]]
-        )
-        self.names = rows.names + tuple(f"torque of {names[i]}" for i in self.joint[torque])
-        self.kinds = rows.kinds + ("torque",) * int(torque.sum())
+        self.A, self.b = rows.over_forces(stance)
+        # A contact's row has no joint, and no sign.
+        self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
+        self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
+        self.names = rows.names + rows.torque_names
+        self.kinds = rows.kinds + ("torque",) * len(rows.joint)
         self.weight = stance.robot.weight
         self.program = Program(self.H, self.g, self.Jb, self.Gb, self.A, self.b, self.weight)
         self.scale = self.program.scale

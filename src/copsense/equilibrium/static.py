@@ -50,11 +50,7 @@ class StaticEquilibrium:
     @property
     def world_wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """The same wrenches in world axes, about the same points [N, Nm]."""
-        turned = [
-            np.concatenate([place.rotation @ w[:3], place.rotation @ w[3:]])
-            for place, w in zip(self.stance.placements, self.wrenches, strict=True)
-        ]
-        return np.array(turned)
+        return self.stance.in_world_axes(self.wrenches)
 
     @property
     def unloaded(self) -> tuple[str, ...]:

@@ -54,12 +54,11 @@ def criterion_region(
     affine = _moving_equilibrium if moving else _held_equilibrium
     f0, F, tau0, T = affine(stance, criterion, axes)
     rows = limit_rows(stance, limits)
-    t = rows.torque
-    some = np.isfinite(t)
-    # A f <= b, tau <= t and -tau <= t with f = f0 + F z and tau = tau0 + T z, c = c0 + axes z.
-    normals = np.vstack([rows.matrix @ F, T[some], -T[some]])
-    offsets = np.concatenate([rows.bound - rows.matrix @ f0, (t - tau0)[some], (t + tau0)[some]])
-    unit = np.concatenate([np.linalg.norm(rows.matrix, axis=1), np.ones(2 * int(some.sum()))])
+    joint, s = rows.joint, rows.sign
+    # A f <= b and s tau <= t with f = f0 + F z and tau = tau0 + T z, c = c0 + axes z.
+    normals = np.vstack([rows.matrix @ F, s[:, None] * T[joint]])
+    offsets = np.concatenate([rows.bound - rows.matrix @ f0, rows.torque[joint] - s * tau0[joint]])
+    unit = np.concatenate([np.linalg.norm(rows.matrix, axis=1), np.ones(len(joint))])
     none = _NOTHING * stance.robot.weight * unit
     size = np.linalg.norm(normals, axis=1)
     still = size <= none

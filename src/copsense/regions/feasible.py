@@ -68,7 +68,9 @@ class _Problem:
 
     def __init__(self, stance: Stance, limits: Limits, axes: Float[np.ndarray, "2 r"]) -> None:
         nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
-        rows, bound, self.names = _rows(stance, limits)
+        all_rows = limit_rows(stance, limits)
+        rows, bound = all_rows.over_forces(stance)
+        self.names = all_rows.names + all_rows.torque_names
         E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
         self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
         self.N = scipy.linalg.null_space(E)
@@ -162,18 +164,3 @@ def _linear_program(
     return scipy.optimize.linprog(
         cost, A, b, bounds=(None, None), method="highs-ds", options=options
     )
-
-
-def _rows(
-    stance: Stance, limits: Limits
-) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"], tuple[str, ...]]:
-    """The limits as A f <= b over stacked forces, torques included, and what each row limits."""
-    rows, nb = limit_rows(stance, limits), stance.robot.base_nv
-    joints = np.flatnonzero(np.isfinite(rows.torque))
-    Jj, Gj = stance.jacobian[:, nb:][:, joints].T, stance.gravity[nb:][joints]
-    # s tau <= t for s = +1, -1, with tau = G_j - J_j' f: -s J_j' f <= t - s G_j.
-    t = rows.torque[joints]
-    A = np.vstack([rows.matrix, -Jj, Jj])
-    b = np.concatenate([rows.bound, t - Gj, t + Gj])
-    names = tuple(f"torque of {stance.robot.torque_names[i]}" for i in joints)
-    return A, b, rows.names + names + names
