@@ -12,6 +12,7 @@ import click
 from tqdm import tqdm
 
 from copsense.cli.options import (
+    criterion_options,
     echo_json,
     read_assignments,
     read_criteria,
@@ -33,6 +34,7 @@ _REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m
     "--duration 10 --output icub.nc --plot icub.png"
 )
 @stance_options
+@criterion_options
 @click.option(
     "--reference",
     default="hold",
