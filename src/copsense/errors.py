@@ -127,6 +127,14 @@ class OutputError(CopsenseError):
     """A file cannot be written where it was asked for, or would overwrite another."""
 
 
+class EngineMismatchError(CopsenseError):
+    """A physics engine's model of a robot is not the robot that the analysis sees."""
+
+
+class ControllerError(CopsenseError):
+    """A controller raised, or returned something that is no vector of torques."""
+
+
 class InfeasibleError(CopsenseError):
     """No contact wrench respects the limits.
 

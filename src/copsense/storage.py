@@ -1,4 +1,4 @@
-"""Storage: writing a sweep to a file that other tools open, and reading it back."""
+"""Storage: writing a sweep or a recording to a file that other tools open, and reading it back."""
 
 from __future__ import annotations
 
@@ -43,19 +43,35 @@ def load_results(path: str | Path) -> xr.Dataset:
     Raises:
         InvalidInputError: no such file, or not a sweep of copsense.
     """
-    path = Path(path)
     write_one = "Write one with: copsense sweep ... --output FILE.nc"
-    if not _tells(path.is_file):
-        raise InvalidInputError(f"no file at {str(path)[:300]!r}. {write_one}.")
-    try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            dataset = opened.load()
-    except (OSError, ValueError, RuntimeError) as error:
-        raise InvalidInputError(
-            f"{path} is no netCDF file that can be read: {error}. {write_one}."
-        ) from None
+    dataset = _read_netcdf(Path(path), write_one)
     _check_sweep(dataset, f"{path} is", write_one)
     dataset["pulling"] = dataset["pulling"].astype(bool)
+    return dataset
+
+
+def write_recording(dataset: xr.Dataset, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write the recording of a rollout as netCDF (``.nc``), whole or not at all.
+
+    Raises:
+        InvalidInputError: another suffix, or no recording.
+        OutputError: the file exists, or cannot be written.
+    """
+    _check_recording(dataset, "this dataset is", "Give what copsense.simulation.rollout returns")
+    path = check_output(path, suffixes=(".nc",), overwrite=overwrite)
+    write_beside(path, lambda temporary: _write_netcdf(dataset, temporary))
+    return path
+
+
+def load_recording(path: str | Path) -> xr.Dataset:
+    """Read the recording of a rollout back from netCDF.
+
+    Raises:
+        InvalidInputError: no such file, or not a recording of copsense.
+    """
+    write_one = "Write one with: copsense balance ... --output FILE.nc"
+    dataset = _read_netcdf(Path(path), write_one)
+    _check_recording(dataset, f"{path} is", write_one)
     return dataset
 
 
@@ -182,6 +198,31 @@ def _check_sweep(dataset: xr.Dataset, what: str, remedy: str) -> None:
         )
 
 
+def _check_recording(dataset: xr.Dataset, what: str, remedy: str) -> None:
+    """Refuse a dataset that is not what `copsense.simulation.rollout` returns."""
+    missing = sorted({"time", "com", "wrench", "cop", "torque"} - set(map(str, dataset.variables)))
+    missing += [
+        f"the attribute {a!r}" for a in ("end_kind", "end_reason") if a not in dataset.attrs
+    ]
+    if missing:
+        raise InvalidInputError(
+            f"{what} no recording of copsense: it lacks {', '.join(missing)}. {remedy}."
+        )
+
+
+def _read_netcdf(path: Path, remedy: str) -> xr.Dataset:
+    """A netCDF file as a dataset in memory."""
+    if not _tells(path.is_file):
+        raise InvalidInputError(f"no file at {str(path)[:300]!r}. {remedy}.")
+    try:
+        with xr.open_dataset(path, engine="netcdf4") as opened:
+            return opened.load()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise InvalidInputError(
+            f"{path} is no netCDF file that can be read: {error}. {remedy}."
+        ) from None
+
+
 def write_beside(path: Path, write: Callable[[Path], object]) -> None:
     """Run `write` on a temporary file beside `path`, then rename it there."""
     temporary = _temporary(path)
@@ -206,8 +247,8 @@ def _write_netcdf(dataset: xr.Dataset, path: Path) -> None:
         for name, variable in dataset.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
-    plain = dataset.assign(pulling=dataset["pulling"].astype("int8"))
-    plain.to_netcdf(path, engine="netcdf4", encoding=encoding)
+    flags = {name: v.astype("int8") for name, v in dataset.data_vars.items() if v.dtype == bool}
+    dataset.assign(flags).to_netcdf(path, engine="netcdf4", encoding=encoding)
 
 
 def _flat(name: str, variable: xr.DataArray) -> dict[str, np.ndarray]:

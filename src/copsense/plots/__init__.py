@@ -23,6 +23,7 @@ from copsense.plots.paper import (
     plot_figure_9b,
     plot_unit_of_length,
 )
+from copsense.plots.rollout import plot_rollout
 from copsense.plots.saving import render_figure, save_figure
 from copsense.plots.soles import plot_soles
 from copsense.plots.stance import plot_stance
@@ -42,6 +43,7 @@ __all__ = [
     "plot_margin",
     "plot_regions",
     "plot_results",
+    "plot_rollout",
     "plot_sensitivity",
     "plot_soles",
     "plot_stance",

@@ -1,0 +1,38 @@
+"""Balancing controllers: what they track, what they see, and the momentum-based one."""
+
+from copsense.controllers.balancing import BalancingController
+from copsense.controllers.controller import Command, Controller, Observation, controller_name
+from copsense.controllers.gains import STIFF, Gains, public_gains
+from copsense.controllers.limited import ShareWithinLimits
+from copsense.controllers.sharing import LoadProblem, ShareByCriterion, ShareLoad
+from copsense.controllers.target import (
+    Hold,
+    PathReference,
+    Ramp,
+    Signal,
+    Sine,
+    Target,
+    lateral_reference,
+)
+
+__all__ = [
+    "STIFF",
+    "BalancingController",
+    "Command",
+    "Controller",
+    "Gains",
+    "Hold",
+    "LoadProblem",
+    "Observation",
+    "PathReference",
+    "Ramp",
+    "ShareByCriterion",
+    "ShareLoad",
+    "ShareWithinLimits",
+    "Signal",
+    "Sine",
+    "Target",
+    "controller_name",
+    "lateral_reference",
+    "public_gains",
+]

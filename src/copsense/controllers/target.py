@@ -1,0 +1,259 @@
+"""Target: where the centre of mass and the posture should be, and how that moves with time.
+
+A signal (`Hold`, `Sine`, `Ramp`) says how far along a path the robot should be at each time; a
+`PathReference` turns that into the path's posture and centre of mass.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.arrays import finite_number
+from copsense.errors import InvalidInputError, UnreachablePostureError
+from copsense.motion import Path, lateral_sweep
+from copsense.stance import Stance
+
+_SPACING = 2e-3  # m between the postures of a lateral reference
+_COARSE = 10  # times as far apart are those that find out whether it can be reached
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """What the robot should do at one instant.
+
+    Attributes:
+        com: centre of mass (3,), world [m].
+        com_velocity: its velocity (3,) [m/s].
+        com_acceleration: its acceleration (3,) [m/s^2].
+        posture: configuration (nq,).
+        velocity: its velocity (nv,).
+    """
+
+    com: Float[np.ndarray, " 3"]
+    com_velocity: Float[np.ndarray, " 3"]
+    com_acceleration: Float[np.ndarray, " 3"]
+    posture: Float[np.ndarray, " nq"]
+    velocity: Float[np.ndarray, " nv"]
+
+
+@runtime_checkable
+class Signal(Protocol):
+    """A distance along a path as a function of time."""
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate and second derivative at a time [s]."""
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and greatest value it ever takes."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Stay at a place.
+
+    Attributes:
+        value: where [m along the path].
+    """
+
+    value: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number."""
+        finite_number(self.value, "the value held")
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate and second derivative."""
+        return self.value, 0.0, 0.0
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and greatest value."""
+        return self.value, self.value
+
+
+@dataclass(frozen=True)
+class Sine:
+    """Sway: amplitude * sin(2 pi frequency t).
+
+    Attributes:
+        amplitude: [m along the path]; negative starts to the other side.
+        frequency: [Hz].
+    """
+
+    amplitude: float
+    frequency: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no motion."""
+        finite_number(self.amplitude, "the amplitude of a sine")
+        finite_number(self.frequency, "the frequency of a sine [Hz]", positive=True)
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate and second derivative."""
+        w, a = 2 * math.pi * self.frequency, self.amplitude
+        s, c = math.sin(w * time), math.cos(w * time)
+        return a * s, a * w * c, -a * w * w * s
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and greatest value."""
+        return -abs(self.amplitude), abs(self.amplitude)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Go to a place at constant speed and stay there; the start and the end are rounded off.
+
+    Attributes:
+        distance: where to [m along the path]; its sign says to which side.
+        speed: on the way [m/s].
+        rounding: time of constant acceleration at either end [s].
+    """
+
+    distance: float
+    speed: float = 5e-3
+    rounding: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse a ramp without speed."""
+        finite_number(self.distance, "the distance of a ramp [m]")
+        finite_number(self.speed, "the speed of a ramp [m/s]", positive=True)
+        finite_number(self.rounding, "the rounding of a ramp [s]", positive=True)
+
+    @property
+    def duration(self) -> float:
+        """When it arrives [s]."""
+        if abs(self.distance) < self.speed * self.rounding:  # never at full speed
+            return 2 * math.sqrt(abs(self.distance) * self.rounding / self.speed)
+        return abs(self.distance) / self.speed + self.rounding
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """Value, rate and second derivative."""
+        sign, a = math.copysign(1.0, self.distance), self.speed / self.rounding
+        end = self.duration
+        if time >= end:
+            return self.distance, 0.0, 0.0
+        rise = min(self.rounding, end / 2)
+        if time < rise:
+            return sign * a * time**2 / 2, sign * a * time, sign * a
+        if time < end - rise:
+            covered = a * rise**2 / 2 + a * rise * (time - rise)
+            return sign * covered, sign * a * rise, 0.0
+        left = end - time
+        return self.distance - sign * a * left**2 / 2, sign * a * left, -sign * a
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and greatest value."""
+        return min(0.0, self.distance), max(0.0, self.distance)
+
+
+class PathReference:
+    """A path on the constraint manifold, followed in time.
+
+    Between the path's postures it interpolates with their exact tangents (cubic Hermite), so that
+    the reference is smooth and stays on the manifold to the fourth order of their spacing.
+
+    Attributes:
+        path: the postures.
+        signal: where along the path's coordinate to be at each time.
+    """
+
+    def __init__(self, path: Path, signal: Signal) -> None:
+        """Prepare the interpolation.
+
+        Raises:
+            InvalidInputError: a path of fewer than two postures, or one that does not rise.
+            UnreachablePostureError: the signal leaves the part of the path that can be reached.
+        """
+        self.path, self.signal = path, signal
+        values = np.asarray(path.values, dtype=float)
+        if len(values) < 2 or not np.all(np.diff(values) > 0):
+            raise InvalidInputError(
+                "a reference needs a path of two or more postures whose coordinate rises. Give a "
+                "finer sweep, from the lower to the higher value."
+            )
+        low, high = signal.extent
+        if low < values[0] - _SLACK or high > values[-1] + _SLACK:
+            raise InvalidInputError(
+                f"the signal goes from {low:g} to {high:g}, the path's {path.coordinate} only from "
+                f"{values[0]:g} to {values[-1]:g}. Make the path longer or the signal smaller."
+            )
+        for i, reason in path.failures.items():
+            if low - _SLACK <= values[i] <= high + _SLACK:
+                raise UnreachablePostureError(
+                    f"the reference cannot be followed at {path.coordinate} = {values[i]:g}: "
+                    f"{reason}"
+                )
+        self._values = values
+        self._model = path.stances[0].robot.model
+        self._com = np.array([s.com for s in path.stances])
+        self._slope = np.array(
+            [s.com_jacobian @ t for s, t in zip(path.stances, path.tangents, strict=True)]
+        )
+        self._q = [s.q for s in path.stances]
+        self._steps = [
+            pin.difference(self._model, a, b) for a, b in zip(self._q, self._q[1:], strict=False)
+        ]
+
+    def at(self, time: float) -> Target:
+        """The target at a time [s]."""
+        value, rate, second = self.signal.at(time)
+        values = self._values
+        i = min(max(int(np.searchsorted(values, value, side="right")) - 1, 0), len(values) - 2)
+        h = values[i + 1] - values[i]
+        u = (value - values[i]) / h
+        # Cubic Hermite basis and its derivatives.
+        shape = np.array([u * (1 - u) ** 2, u * u * (3 - 2 * u), u * u * (u - 1)])
+        slope = np.array([(1 - u) * (1 - 3 * u), 6 * u * (1 - u), u * (3 * u - 2)]) / h
+        bend = np.array([6 * u - 4, 6 - 12 * u, 6 * u - 2]) / h**2
+        com = np.array(
+            [h * self._slope[i], self._com[i + 1] - self._com[i], h * self._slope[i + 1]]
+        )
+        q = np.array([h * self.path.tangents[i], self._steps[i], h * self.path.tangents[i + 1]])
+        along = slope @ com
+        return Target(
+            self._com[i] + shape @ com,
+            along * rate,
+            along * second + bend @ com * rate**2,
+            pin.integrate(self._model, self._q[i], shape @ q),
+            slope @ q * rate,
+        )
+
+
+def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
+    """Sway the centre of mass sideways, quasi-statically ([Romano2016] Section V).
+
+    The signal is the distance [m] of CoM y from where the stance has it; CoM x is held, and height
+    and posture follow the path of `copsense.lateral_sweep`.
+
+    Raises:
+        UnreachablePostureError: the robot cannot lean that far.
+    """
+    low, high = signal.extent
+    start, ground = float(stance.com[1]), min(p.translation[2] for p in stance.placements)
+    if max(abs(low), abs(high)) > stance.com[2] - ground:
+        raise UnreachablePostureError(
+            f"the reference leans from {low:g} m to {high:g} m, farther than the CoM of "
+            f"{stance.robot.name!r} is high ({stance.com[2] - ground:.2f} m). Give less, in metres."
+        )
+    low, high = min(low, -_SPACING), max(high, _SPACING)
+    count = math.ceil((high - low) / _SPACING) + 1
+    if count > 5 * _COARSE:
+        # A lean far out of reach is told by a few postures, not by hundreds.
+        few = lateral_sweep(
+            stance, start + low, start + high, count // _COARSE + 1, com_x=float(stance.com[0])
+        )
+        for i in (0, len(few) - 1):
+            if i in few.failures:
+                raise UnreachablePostureError(few.failures[i])
+    path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
+    return PathReference(replace(path, values=path.values - start, coordinate="com_y"), signal)

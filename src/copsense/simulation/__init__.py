@@ -1,0 +1,24 @@
+"""Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
+
+from copsense.simulation.disturbance import Motors, Noise, Push
+from copsense.simulation.engine import MujocoSimulator
+from copsense.simulation.rollout import rollout
+from copsense.simulation.scenario import Scenario
+from copsense.simulation.settings import PhysicsSettings
+from copsense.simulation.simulator import Simulator, SimulatorStoppedError, Snapshot
+from copsense.simulation.watch import Event, Thresholds
+
+__all__ = [
+    "Event",
+    "Motors",
+    "MujocoSimulator",
+    "Noise",
+    "PhysicsSettings",
+    "Push",
+    "Scenario",
+    "Simulator",
+    "SimulatorStoppedError",
+    "Snapshot",
+    "Thresholds",
+    "rollout",
+]

@@ -1,0 +1,350 @@
+"""MujocoSimulator: MuJoCo, built from the robot and the contacts that the analysis uses.
+
+The only module that knows MuJoCo. Its model is written from the Pinocchio model itself, so that
+locked joints, replaced inertias and robots without a file need no second reading; then mass matrix,
+bias forces and centre of mass of both engines are compared.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.contact import Contact
+from copsense.errors import EngineMismatchError, InvalidInputError, MissingExtraError
+from copsense.robot import Robot
+from copsense.simulation.settings import PhysicsSettings
+from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
+from copsense.simulation.supports import support_points
+from copsense.stance import Stance
+
+_AGREEMENT = 1e-8  # of mass matrix, bias and CoM, relative to their size
+_POINT = 1e-4  # m: radius of the ball at each support point
+_HINGES = ("JointModelR",)
+_SLIDES = ("JointModelP",)
+
+
+class MujocoSimulator:
+    """A stance in MuJoCo: torque-controlled joints, soles on rigid planes.
+
+    Every support point of a contact may touch the plane of its own contact and nothing else; the
+    rest of the robot passes through the ground, which a fall ends anyway.
+
+    Args:
+        stance: robot, start configuration and contacts.
+        settings: time step and contact model.
+
+    Raises:
+        MissingExtraError: mujoco is not installed.
+        InvalidInputError: a robot or contact that cannot be simulated.
+        EngineMismatchError: MuJoCo sees another robot than Pinocchio.
+    """
+
+    def __init__(self, stance: Stance, settings: PhysicsSettings | None = None) -> None:
+        """Build the model and compare the engines."""
+        self._stance, self.settings = stance, settings or PhysicsSettings()
+        self._mujoco = _mujoco()
+        self._model = _build(self._mujoco, stance, self.settings)
+        self._data = self._mujoco.MjData(self._model)
+        joints = [self._model.joint(name) for name in stance.robot.joint_names]
+        self._columns = np.concatenate([np.arange(6), [int(j.dofadr[0]) for j in joints]])
+        self._positions = np.array([int(j.qposadr[0]) for j in joints], dtype=int)
+        self._sites = [self._model.site(f"contact {name}").id for name in stance.contact_names]
+        points = [self._model.geom(g).name.partition(" | ") for g in range(self._model.ngeom)]
+        self._contact_of = np.array(
+            [stance.contact_names.index(name) if mark else -1 for name, mark, _ in points]
+        )
+        self._circles = _circles(stance.robot)
+        self._is_plain = np.array([not circle for _, circle in self._circles], dtype=bool)
+        self._plain = np.array([i for i, circle in self._circles if not circle], dtype=int)
+        self._round = np.array([i for i, circle in self._circles if circle], dtype=int)
+        self._fixed_axes = {
+            k: world.rotation
+            for k, (c, world) in enumerate(zip(stance.contacts, stance.placements, strict=True))
+            if c.kind == "point"
+        }
+        self._compare()
+        self.reset()
+
+    @property
+    def stance(self) -> Stance:
+        """Robot and contacts; its configuration is where a simulation starts."""
+        return self._stance
+
+    @property
+    def time_step(self) -> float:
+        """Duration of one step [s]."""
+        return self.settings.time_step
+
+    def reset(self) -> Snapshot:
+        """Put the robot at rest at the stance's configuration, time zero."""
+        self._mujoco.mj_resetData(self._model, self._data)
+        self._move(self._stance.q, np.zeros(self._stance.robot.model.nv))
+        self._mujoco.mj_forward(self._model, self._data)
+        # No solution to start from: the same start gives the same run.
+        self._data.qacc_warmstart[:] = 0.0
+        return self._snapshot(measured=False)
+
+    def step(
+        self,
+        torques: Float[np.ndarray, " n"],
+        external: Float[np.ndarray, " nv"] | None = None,
+    ) -> Snapshot:
+        """Go on by one time step; see `Simulator.step`."""
+        data, before = self._data, float(self._data.time)
+        # Motors and pushes enter as generalised forces: no gears, ranges or names between.
+        data.qfrc_applied[self._columns[6:]] = torques
+        data.qfrc_applied[:6] = 0.0
+        if external is not None:
+            base = pin.Quaternion(*self._data.qpos[3:7]).matrix()
+            data.qfrc_applied[:3] = base @ external[:3]
+            data.qfrc_applied[3:6] = external[3:6]
+            data.qfrc_applied[self._columns[6:]] += external[6:]
+        shown = self._mujoco.get_mju_user_warning()
+        self._mujoco.set_mju_user_warning(_quiet)  # it would write a log file where we stand
+        self._mujoco.mj_step(self._model, data)
+        self._mujoco.set_mju_user_warning(shown)
+        warned = [w for w in _FATAL if data.warning[getattr(self._mujoco.mjtWarning, w)].number]
+        if warned or not data.time > before:
+            raise SimulatorStoppedError(
+                f"MuJoCo gave up ({', '.join(warned) or 'it started over'}): the motion diverged",
+                before,
+            )
+        if not (np.all(np.isfinite(data.qpos)) and np.all(np.isfinite(data.qvel))):
+            raise SimulatorStoppedError("the motion is not finite any more", before)
+        return self._snapshot(measured=True)
+
+    def _move(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Pinocchio's configuration and velocity into MuJoCo's."""
+        x, y, z, w = q[3:7]
+        self._data.qpos[:7] = [*q[:3], w, x, y, z]
+        # A continuous joint is (cos, sin) there and an angle here.
+        self._data.qpos[self._positions] = [
+            np.arctan2(q[i + 1], q[i]) if round_ else q[i] for i, round_ in self._circles
+        ]
+        self._data.qvel[self._columns] = v
+        self._data.qvel[:3] = pin.Quaternion(w, x, y, z).matrix() @ v[:3]
+
+    def _snapshot(self, *, measured: bool) -> Snapshot:
+        data = self._data
+        q = np.empty(self._stance.robot.model.nq)
+        w, x, y, z = data.qpos[3:7]
+        q[:7] = [*data.qpos[:3], x, y, z, w]
+        angles = data.qpos[self._positions]
+        q[self._plain] = angles[self._is_plain]
+        if len(self._round):
+            turns = angles[~self._is_plain]
+            q[self._round], q[self._round + 1] = np.cos(turns), np.sin(turns)
+        v = data.qvel[self._columns]
+        # MuJoCo's base: linear velocity in world axes, angular in its own.
+        v[:3] = pin.Quaternion(w, x, y, z).matrix().T @ v[:3]
+        rotations = data.site_xmat[self._sites].reshape(-1, 3, 3).copy()
+        positions = data.site_xpos[self._sites].copy()
+        wrenches = np.zeros((len(self._sites), 6))
+        if measured:
+            wrenches = self._wrenches(positions, rotations)
+        return Snapshot(float(data.time), q, v, wrenches, positions, rotations)
+
+    def _wrenches(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
+        """Contact forces of the last step, summed about each contact frame, in its axes."""
+        data, found = self._data, self._data.contact
+        forces, moments = np.zeros((2, len(self._sites), 3))
+        touching = np.flatnonzero(found.efc_address >= 0)
+        if len(touching):
+            owner, start = self._contact_of[found.geom[touching, 1]], found.efc_address[touching]
+            # Elliptic cones: the solver's forces are (normal, tangent, tangent) in the contact's
+            # axes, the rows of its frame.
+            local = data.efc_force[start[:, None] + _THREE]
+            force = np.einsum("ci,cij->cj", local, found.frame[touching].reshape(-1, 3, 3))
+            arm = found.pos[touching] - positions[owner]
+            np.add.at(forces, owner, force)
+            np.add.at(moments, owner, _cross(arm, force))
+        if self._fixed_axes:
+            rotations = rotations.copy()
+        for k, axes in self._fixed_axes.items():
+            rotations[k], moments[k] = axes, 0.0  # a point has no moment but its radius's
+        turned = np.stack([forces, moments], axis=1) @ rotations
+        return np.asarray(turned.reshape(len(self._sites), 6))
+
+    def _compare(self) -> None:
+        """Compare the engines at the start and at a posture and motion nearby."""
+        robot, random = self._stance.robot, np.random.default_rng(0)
+        model, zero = robot.model, np.zeros(robot.model.nv)
+        for size in (0.0, 0.3):
+            q = pin.integrate(model, self._stance.q, size * random.uniform(-1, 1, model.nv))
+            v = size * random.uniform(-1, 1, model.nv)
+            self._move(q, v)
+            self._mujoco.mj_forward(self._model, self._data)
+            M = np.zeros((model.nv, model.nv))
+            self._mujoco.mj_fullM(self._model, self._data, M)
+            world = np.eye(model.nv)
+            world[:3, :3] = pin.Quaternion(*self._data.qpos[3:7]).matrix()
+            M = world.T @ M[np.ix_(self._columns, self._columns)] @ world
+            bias = world.T @ self._data.qfrc_bias[self._columns]
+            # MuJoCo differentiates the base's linear velocity in world axes, Pinocchio in its own.
+            drift = zero.copy()
+            drift[:3] = np.cross(v[3:6], v[:3])
+            pairs = {
+                "mass matrix": (M, pin.crba(model, model.createData(), q)),
+                "bias": (bias, pin.nonLinearEffects(model, model.createData(), q, v) - M @ drift),
+                "centre of mass": (
+                    self._data.subtree_com[1],
+                    pin.centerOfMass(model, model.createData(), q),
+                ),
+            }
+            for what, (here, there) in pairs.items():
+                off = float(np.abs(here - there).max()) / max(1.0, float(np.abs(there).max()))
+                if not off <= _AGREEMENT:
+                    raise EngineMismatchError(
+                        f"MuJoCo and Pinocchio disagree on the {what} of {robot.name!r}, "
+                        f"relatively by {off:.1e}. A joint or an inertia of this robot is not "
+                        "supported; simplify its description."
+                    )
+
+
+_THREE = np.arange(3)
+_FATAL = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL")
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Rows of a x b; NumPy's own costs more than the rest of a step."""
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
+def _quiet(message: str) -> None:
+    """Warnings are read from the engine's counters."""
+
+
+def _mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingExtraError("mujoco", "sim", "simulating a robot") from None
+    return mujoco
+
+
+def _circles(robot: Robot) -> list[tuple[int, bool]]:
+    """Where each joint stands in a configuration, and whether it is stored as (cos, sin)."""
+    return [(joint.idx_q, joint.nq == 2) for joint in list(robot.model.joints)[2:]]
+
+
+def _build(mujoco: Any, stance: Stance, settings: PhysicsSettings) -> Any:
+    """The compiled MuJoCo model of a stance."""
+    robot, model = stance.robot, stance.robot.model
+    if model.joints[1].shortname() != "JointModelFreeFlyer":
+        raise InvalidInputError(
+            f"robot {robot.name!r} lives in a plane: a simulation is spatial. Use a robot with a "
+            "free-floating base."
+        )
+    spec = mujoco.MjSpec()
+    spec.compiler.autolimits = False
+    option = spec.option
+    option.timestep, option.gravity = settings.time_step, model.gravity.linear
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio, option.tolerance, option.iterations = settings.impedance_ratio, 1e-10, 100
+    # A fall must not start over in silence.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    bodies = {0: spec.worldbody}
+    for i in range(1, model.njoints):
+        bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])
+    for contact, world in zip(stance.contacts, stance.placements, strict=True):
+        _add_contact(mujoco, spec, bodies, robot, contact, world, settings)
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise InvalidInputError(
+            f"MuJoCo cannot simulate robot {robot.name!r}: {str(error).strip().splitlines()[0]}. "
+            "Give its links physical masses and inertias."
+        ) from None
+
+
+def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
+    """The body behind a joint of the model, with that joint."""
+    model = robot.model
+    place, inertia, joint = model.jointPlacements[i], model.inertias[i], model.joints[i]
+    body = parent.add_body(name=f"body {model.names[i]}", pos=place.translation, quat=_wxyz(place))
+    body.explicitinertial = True
+    body.mass, body.ipos = inertia.mass, inertia.lever
+    at_com = inertia.inertia
+    body.fullinertia = [*np.diag(at_com), at_com[0, 1], at_com[0, 2], at_com[1, 2]]
+    if i == 1:
+        body.add_freejoint()
+        return body
+    kind, subspace = joint.shortname(), np.ravel(joint.createData().S)
+    if not kind.startswith((*_HINGES, *_SLIDES)) or joint.nv != 1 or not _unit(subspace):
+        raise InvalidInputError(
+            f"joint {model.names[i]!r} of robot {robot.name!r} is a {kind}, which cannot be "
+            "simulated. Lock it: robot.keeping([...])."
+        )
+    hinge = bool(np.any(subspace[3:]))
+    body.add_joint(
+        name=model.names[i],
+        type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=subspace[3:] if hinge else subspace[:3],
+        armature=float(model.armature[joint.idx_v]),
+    )
+    return body
+
+
+def _unit(subspace: np.ndarray) -> bool:
+    """Whether a motion is a pure turn or slide of unit rate."""
+    parts = np.linalg.norm(subspace[:3]), np.linalg.norm(subspace[3:])
+    return bool(np.isclose(max(parts), 1.0) and np.isclose(min(parts), 0.0))
+
+
+def _add_contact(
+    mujoco: Any,
+    spec: Any,
+    bodies: dict[int, Any],
+    robot: Robot,
+    contact: Contact,
+    world: pin.SE3,
+    settings: PhysicsSettings,
+) -> None:
+    """A contact's frame, its support points and the plane that they stand on."""
+    frame = robot.frame(contact.frame)
+    body = bodies[frame.parentJoint]
+    place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+    body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=_wxyz(place))
+    up = world.rotation[:, 2]
+    point = contact.kind == "point"
+    spec.worldbody.add_geom(
+        name=f"plane under {contact.name}",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 1.0],
+        # A point's ball is centred on the point; a sole's balls stand on the sole.
+        pos=world.translation - (_POINT * up if point else 0.0),
+        quat=_wxyz(world),
+        contype=0,
+        conaffinity=0,
+    )
+    friction = settings.friction if contact.friction is None else contact.friction
+    for number, (x, y) in enumerate(support_points(contact, settings.sole_detail)):
+        name = f"{contact.name} | {number}"
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[_POINT, 0.0, 0.0],
+            pos=place.act(np.array([x, y, 0.0 if point else _POINT])),
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+        )
+        spec.add_pair(
+            geomname1=f"plane under {contact.name}",
+            geomname2=name,
+            condim=3,
+            friction=[friction, friction, 0.0, 0.0, 0.0],
+            solref=[settings.contact_time, 1.0],
+        )
+
+
+def _wxyz(place: pin.SE3) -> list[float]:
+    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
+    return [w, x, y, z]

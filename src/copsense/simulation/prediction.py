@@ -1,0 +1,122 @@
+"""StaticPrediction: where the centres of pressure should be, and how far the robot may lean.
+
+The static analysis along the very path that a closed loop follows. It uses the criterion that the
+controller applies, so a comparison holds the theory against physics, not against another law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Float
+
+from copsense.contact import half_planes
+from copsense.controllers.target import PathReference, Ramp, lateral_reference
+from copsense.cop import contact_cops
+from copsense.criterion import Criterion
+from copsense.equilibrium import solve_equilibrium
+from copsense.limits import Limits
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True, eq=False)
+class StaticPrediction:
+    """Static centres of pressure along a path.
+
+    Attributes:
+        values: the path's coordinate, relative to the start (N,) [m].
+        cops: centre of pressure of each contact (N, nc, 2), contact axes [m]; NaN where unloaded.
+        joints: position of each joint (N, n) [rad, m].
+        excursion: how far from the start the path's coordinate may go until the first contact's
+            CoP reaches an edge [m]; infinite where none does on this path.
+        contact: the contact that tips first, or nothing.
+        first_order: the same from CoP and slope at the start alone [m].
+    """
+
+    values: Float[np.ndarray, " N"]
+    cops: Float[np.ndarray, "N nc 2"]
+    joints: Float[np.ndarray, "N n"]
+    excursion: float
+    contact: str
+    first_order: float
+
+    def attach(self, dataset: xr.Dataset) -> xr.Dataset:
+        """A recording with this prediction beside it, over a dimension of its own."""
+        what = {"units": "m", "long_name": "static centre of pressure along the path, contact axes"}
+        return dataset.assign(
+            static_cop=(("static", "contact", "axis"), self.cops, what),
+            static_joint=(
+                ("static", "joint"),
+                self.joints,
+                {"units": "rad, m", "long_name": "joint position along the path"},
+            ),
+            static_travel=(
+                "static",
+                self.values,
+                {"units": "m", "long_name": "where on the path, from its start"},
+            ),
+        ).assign_attrs(
+            static_excursion=self.excursion,
+            static_contact=self.contact,
+            static_first_order=self.first_order,
+        )
+
+
+def predict(
+    reference: PathReference, criterion: Criterion, limits: Limits | None = None
+) -> StaticPrediction:
+    """The static prediction along a reference's path, from its start at zero outwards.
+
+    The excursion is linear between the path's postures, which a lateral reference has every 2 mm.
+    """
+    path, nc = reference.path, len(reference.path.stances[0].contacts)
+    cops = np.full((len(path), nc, 2), np.nan)
+    for i, here in enumerate(path.stances):
+        if i not in path.failures:
+            equilibrium = solve_equilibrium(here, criterion, limits)
+            if not equilibrium.unloaded:
+                cops[i] = contact_cops(equilibrium)
+    values = np.asarray(path.values, dtype=float)
+    margins = [_edge_distances(path.stances[0], cops[:, k], k) for k in range(nc)]
+    low, high = reference.signal.extent
+    side = 1.0 if high >= -low else -1.0
+    middle = int(np.argmin(np.abs(values)))
+    order = np.arange(middle, len(values)) if side > 0 else np.arange(middle, -1, -1)
+    travel = np.abs(values[order] - values[middle])
+    excursion, contact, first_order = np.inf, "", np.inf
+    for k, distances in enumerate(margins):
+        for edge in distances[order].T:
+            if len(travel) > 1 and edge[1] < edge[0]:
+                first_order = min(first_order, edge[0] / (edge[0] - edge[1]) * travel[1])
+            beyond = np.flatnonzero(edge <= 0)
+            if len(beyond):
+                i = int(beyond[0])
+                at = 0.0
+                if i:
+                    part = edge[i - 1] / (edge[i - 1] - edge[i])
+                    at = float(travel[i - 1] + part * (travel[i] - travel[i - 1]))
+                if at < excursion:
+                    excursion, contact = at, path.stances[0].contact_names[k]
+    robot = path.stances[0].robot
+    joints = np.array(
+        [[robot.joint_position(s.q, joint) for joint in robot.joint_names] for s in path.stances]
+    )
+    return StaticPrediction(values, cops, joints, excursion, contact, float(first_order))
+
+
+def predict_lean(
+    stance: Stance, criterion: Criterion, reach: float, limits: Limits | None = None
+) -> StaticPrediction:
+    """The static prediction of a lateral lean up to `reach` [m]; its sign says to which side."""
+    return predict(lateral_reference(stance, Ramp(reach)), criterion, limits)
+
+
+def _edge_distances(stance: Stance, cops: np.ndarray, k: int) -> np.ndarray:
+    """Distance of CoPs (N, 2) to each edge of a contact's sole (N, e); none for a point."""
+    contact = stance.contacts[k]
+    if contact.polygon is None or contact.kind == "point":
+        return np.full((len(cops), 1), np.inf)
+    normals, offsets = half_planes(contact.polygon)
+    return np.asarray(offsets - cops @ normals.T)

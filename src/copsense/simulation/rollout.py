@@ -1,0 +1,172 @@
+"""rollout: a controller and a simulator go through a scenario; what happened is a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+import xarray as xr
+
+from copsense.controllers.controller import Controller, Observation, ask, controller_name
+from copsense.controllers.target import PathReference, lateral_reference
+from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
+from copsense.simulation.actuation import Actuation
+from copsense.simulation.recording import Recorder
+from copsense.simulation.scenario import Scenario
+from copsense.simulation.simulator import Simulator, SimulatorStoppedError, Snapshot
+from copsense.simulation.watch import Event, Thresholds, Watch
+from copsense.stance import Stance
+
+_REPORT = 50  # control periods between two reports of progress
+
+
+def rollout(
+    simulator: Simulator,
+    controller: Controller,
+    scenario: Scenario,
+    *,
+    until: Literal["tip", "fall"] = "tip",
+    record_period: float = 5e-3,
+    thresholds: Thresholds | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> xr.Dataset:
+    """Run a scenario in closed loop.
+
+    Args:
+        simulator: the robot on its contacts; it is reset first.
+        controller: a callable observation -> torques (n,) or `Command`.
+        scenario: what to do and what disturbs it.
+        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` goes on
+            to a fall or the scenario's end.
+        record_period: time between two rows of the record [s], rounded to control periods.
+        thresholds: what counts as a tip or a fall.
+        progress: called with the number of control periods done since the last call.
+
+    Returns:
+        A dataset over ``time`` with centre of mass, wrenches (measured and commanded), CoPs,
+        margins, torques and joints. Its attributes say why it ended (``end_kind``: ``"completed"``
+        or what went wrong, ``end_reason``, ``end_time``) and which contact tipped first
+        (``tip_*``). What was recorded before an early end is kept.
+
+    Raises:
+        CopsenseError: the scenario does not fit the robot or the simulator.
+        ControllerError: the controller failed before anything could be recorded.
+    """
+    if until not in ("tip", "fall"):
+        raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
+    stance, dt = simulator.stance, simulator.time_step
+    robot, name = stance.robot, controller_name(controller)
+    n = len(robot.torque_names)
+    scenario.check_robot(robot)
+    steps = scenario.steps_per_control(dt)
+    reference = scenario.reference
+    if not isinstance(reference, PathReference):
+        reference = lateral_reference(stance, reference)
+    actuation = Actuation(scenario.motors, robot, dt)
+    sensors, pushes = _Sensors(scenario, stance), _Pushes(scenario, stance)
+    watch, recorder = Watch(stance, thresholds or Thresholds()), Recorder(stance)
+    every = max(1, round(record_period / scenario.control_period))
+    count = round(scenario.duration / scenario.control_period)
+    if count < 1:
+        raise InvalidInputError(
+            f"the scenario lasts {scenario.duration:g} s, less than a control period. Make it "
+            "longer."
+        )
+    now, tip, tip_com, reported = simulator.reset(), None, None, 0
+    end = Event("completed", scenario.duration, "completed")
+    for number in range(count):
+        time = number * scenario.control_period
+        target = reference.at(time)
+        q, v = sensors.read(now)
+        try:
+            observation = Observation(time, q, v, target, now.wrenches)
+            command = ask(controller, observation, n)
+            here = now
+            for _ in range(steps):
+                torques = actuation.apply(command.torques)
+                now = simulator.step(torques, pushes.at(now))
+        except ControllerError as error:
+            if not len(recorder):
+                raise
+            end = Event("controller", time, str(error))
+            break
+        except SimulatorStoppedError as error:
+            end = Event("engine", error.time, str(error))
+            break
+        com = watch.com(now)
+        contact = watch.contact_event(now) if tip is None else None
+        if contact:
+            tip, tip_com = contact, com
+        over = watch.end_event(now, float(com[2]))
+        ends = over or (contact if until == "tip" else None)
+        if number % every == 0 or ends or number == count - 1:
+            recorder.add(here, now, target, command, torques, watch.tilts(now))
+        if ends:
+            end = ends
+            if tip and tip is not ends:  # what came of it
+                then = ends.message.partition(";")[0]
+                end = replace(ends, message=f"{tip.message}; then {then}")
+            break
+        if progress and number - reported >= _REPORT:
+            progress(number - reported)
+            reported = number
+    if progress:
+        progress(number + 1 - reported)
+    if not len(recorder):
+        raise ControllerError(
+            f"the very first torques of controller {name!r} broke the simulation: {end.message}. "
+            "Lower its gains."
+        )
+    dataset = recorder.dataset(end, tip, tip_com)
+    dataset.attrs |= {
+        "controller": name,
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "control_period": scenario.control_period,
+        "time_step": dt,
+    }
+    return dataset
+
+
+class _Sensors:
+    """The state as the controller sees it."""
+
+    def __init__(self, scenario: Scenario, stance: Stance) -> None:
+        self._noise, self._model = scenario.noise, stance.robot.model
+        self._random = np.random.default_rng(scenario.seed)
+        self._quiet = not (self._noise.position or self._noise.velocity)
+
+    def read(self, now: Snapshot) -> tuple[np.ndarray, np.ndarray]:
+        if self._quiet:
+            return now.q, now.v
+        n = self._model.nv - 6
+        turn, v = np.zeros(self._model.nv), now.v.copy()
+        turn[6:] = self._noise.position * self._random.standard_normal(n)
+        v[6:] += self._noise.velocity * self._random.standard_normal(n)
+        return pin.integrate(self._model, now.q, turn), v
+
+
+class _Pushes:
+    """Pushes as a generalised force."""
+
+    def __init__(self, scenario: Scenario, stance: Stance) -> None:
+        self._pushes, self._model = scenario.pushes, stance.robot.model
+        self._data = self._model.createData()
+
+    def at(self, now: Snapshot) -> np.ndarray | None:
+        active = [push for push in self._pushes if push.acts(now.time + 1e-9)]
+        if not active:
+            return None
+        total = np.zeros(self._model.nv)
+        pin.computeJointJacobians(self._model, self._data, now.q)
+        pin.updateFramePlacements(self._model, self._data)
+        for push in active:
+            frame = self._model.getFrameId(push.frame)
+            J = pin.getFrameJacobian(
+                self._model, self._data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            )
+            total += J[:3].T @ np.array(push.force)
+        return total
