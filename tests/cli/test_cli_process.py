@@ -1,8 +1,8 @@
 """The real command in a process of its own: start-up, exit codes, signals, closed output."""
 
 import json
-import re
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
