@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from copsense._version import __version__
 from copsense.binding import LimitChange, next_change
+from copsense.closed_loop import sway_in_simulation
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.equilibrium import solve_equilibrium
 from copsense.errors import InvalidInputError
@@ -28,10 +29,12 @@ from copsense.paper import (
     FourBar,
     LateralSweep,
     ReferenceValue,
+    Sway,
     compare_with_reference,
     evaluate_errata,
     evaluate_four_bar_claims,
     evaluate_icub_claims,
+    evaluate_sway_claims,
     figure_3a,
     figure_3b,
     figure_4,
@@ -52,6 +55,8 @@ _ROBOT, _MODEL = "icub", "iCubGenova04"
 _PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 # What public balancing configurations for this robot use: mu = 1/3, torsion 1/75 m, f_z over 10 N.
 LIMITS = Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
+SWAY_FREQUENCY = 0.05  # Hz: slow enough to be nearly quasi-static; the paper prints none
+_ROLLING = 3e-3  # m: least margin of the CoP in closed loop within limits
 _LEAST = 5  # postures: fewer than this cannot show where anything crosses
 _LENGTHS = 25  # values of L in the figure on the unit of length
 
@@ -95,7 +100,7 @@ class WithinLimits:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """What the paper's static half comes to.
+    """What the paper comes to.
 
     Attributes:
         four_bar: the linkage with the paper's dimensions.
@@ -105,8 +110,10 @@ class Reproduction:
         lateral_at_sole: the same with the contact frames at the bottom of the collision geometry.
         unit_of_length: criterion 1's dependence on L.
         within_limits: the same path within limits, and the regions that they leave the CoM.
+        sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.
+        sway_claims: Section V, judged in closed loop.
         changed_at_sole: identifiers of the iCub's claims whose verdict is another one with the
             contact frames at the soles' bottom.
         errata: the printed text against what holds.
@@ -125,8 +132,10 @@ class Reproduction:
     lateral_at_sole: xr.Dataset
     unit_of_length: UnitOfLength
     within_limits: WithinLimits
+    sway: Sway | None
     four_bar_claims: tuple[EvaluatedClaim, ...]
     icub_claims: tuple[EvaluatedClaim, ...]
+    sway_claims: tuple[EvaluatedClaim, ...]
     changed_at_sole: tuple[str, ...]
     errata: tuple[EvaluatedErratum, ...]
     references: tuple[ReferenceValue, ...]
@@ -139,7 +148,7 @@ class Reproduction:
     @property
     def claims(self) -> tuple[EvaluatedClaim, ...]:
         """Every claim, the four-bar's first."""
-        return self.four_bar_claims + self.icub_claims
+        return self.four_bar_claims + self.icub_claims + self.sway_claims
 
     @property
     def sweep_facts(self) -> LateralSweep:
@@ -148,19 +157,24 @@ class Reproduction:
 
 
 def reproduce(
-    *, postures: int = 141, limits: Limits = LIMITS, progress: Progress | None = None
+    *,
+    postures: int = 141,
+    limits: Limits = LIMITS,
+    sway_frequency: float | None = None,
+    progress: Progress | None = None,
 ) -> Reproduction:
-    """Compute the static half of [Romano2016] on the four-bar and on the iCub.
+    """Reproduce [Romano2016] on the four-bar and on the iCub.
 
     Args:
         postures: of each lateral sweep of the iCub's CoM, from over one foot to over the other.
         limits: of the section on limits; the rest of the paper knows none.
+        sway_frequency: of the CoM's sine in closed loop [Hz]; None leaves the closed loop out.
         progress: called as ``progress(stage, done, total)``.
 
     Raises:
         InvalidInputError: fewer than 5 postures, or no limit switched on.
         InfeasibleError: no wrench respects the limits where the CoM is in the middle.
-        MissingExtraError: the iCub models are not installed.
+        MissingExtraError: the iCub models are not installed, or MuJoCo is not for a closed loop.
     """
     if postures < _LEAST:
         raise InvalidInputError(f"a reproduction needs {_LEAST} postures or more, got {postures}.")
@@ -180,6 +194,9 @@ def reproduce(
     within = _within_limits(stance, path, limits, clock)
     with clock.stage("unit of length"):
         unit = _unit_of_length(stance)
+    sway = None
+    if sway_frequency is not None:
+        sway = _sway(stance, limits, sway_frequency, clock)
     with clock.stage("claims"):
         icub_claims = evaluate_icub_claims(lateral, four_bar)
         there = {c.claim.identifier: c.verdict for c in evaluate_icub_claims(at_sole, four_bar)}
@@ -194,8 +211,10 @@ def reproduce(
         lateral_at_sole=at_sole,
         unit_of_length=unit,
         within_limits=within,
+        sway=sway,
         four_bar_claims=claims,
         icub_claims=icub_claims,
+        sway_claims=() if sway is None else evaluate_sway_claims(sway),
         changed_at_sole=tuple(
             c.claim.identifier for c in icub_claims if there[c.claim.identifier] is not c.verdict
         ),
@@ -274,6 +293,18 @@ def _within_limits(stance: Stance, path: Path, limits: Limits, clock: _Clock) ->
         for criterion in criteria:
             regions[criterion.name] = criterion_region(stance, criterion, limits)
     return WithinLimits(limits, dataset, tuple(bindings), regions)
+
+
+def _sway(stance: Stance, limits: Limits, frequency: float, clock: _Clock) -> Sway:
+    # A sole in the engine rolls a little before its CoP is at the very edge.
+    within = replace(limits, cop_margin=max(limits.cop_margin or 0.0, _ROLLING))
+    started, progress = time.perf_counter(), clock.progress
+    wrench, torque = _paper_criteria()
+    found = sway_in_simulation(
+        stance, wrench, torque, within, frequency=frequency, progress=progress
+    )
+    clock.seconds["closed loop"] = time.perf_counter() - started
+    return found
 
 
 def _facts(stance: Stance, criterion: Criterion) -> dict[str, float]:
@@ -362,7 +393,7 @@ def _versions() -> dict[str, str]:
         "Python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
     }
-    for package in ("pin", "numpy", "scipy", "xarray", "matplotlib", "icub-models"):
+    for package in ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models"):
         try:
             found[package] = version(package)
         except PackageNotFoundError:

@@ -75,7 +75,7 @@ def test_a_plot_takes_limits_the_sweep_knew_nothing_of(tmp_path):
 
 def test_a_reproduction_takes_limits_and_refuses_impossible_ones_at_once(tmp_path):
     folder = tmp_path / "report"
-    arguments = ("reproduce", "--postures", "21", "--output", folder, "--quiet")
+    arguments = ("reproduce", "--static", "--postures", "21", "--output", folder, "--quiet")
     assert "In conflict" in copsense(*arguments, "--limits", "normal-force=200").error
     assert not folder.exists()
     assert copsense(*arguments, "--limits", "friction=0.2,cop-margin=0.01,torque=30").code == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import shlex
 import sys
 
@@ -26,22 +27,31 @@ from copsense.cli.options import limits_option, read_limits
     show_default=True,
     help="Postures of the iCub's lateral sweep.",
 )
+@click.option("--static", is_flag=True, help="Leave the closed loop in MuJoCo out.")
 @limits_option
 @click.option("--force", is_flag=True, help="Overwrite an earlier reproduction.")
 @click.option("--quiet", is_flag=True, help="No progress.")
-def reproduce(output: str, postures: int, limits: str | None, force: bool, quiet: bool) -> None:
-    """Reproduce the static half of [Romano2016] on the four-bar and on the iCub.
+def reproduce(
+    output: str, postures: int, static: bool, limits: str | None, force: bool, quiet: bool
+) -> None:
+    """Reproduce [Romano2016] on the four-bar and on the iCub, statically and in closed loop.
 
     Every claim of the paper is tested (holds, holds if, does not hold), every figure drawn, and one
     self-contained HTML report written. The last line printed is its path. Limits are those of the
     report's section on them; by default, what public configurations for this robot use.
     """
     from copsense.report import check_report_folder, write_report
-    from copsense.reproduction import LIMITS
+    from copsense.reproduction import LIMITS, SWAY_FREQUENCY
     from copsense.reproduction import reproduce as compute
 
     check_report_folder(output, overwrite=force)
     within = read_limits(limits) or LIMITS
+    if not static and importlib.util.find_spec("mujoco") is None:
+        click.echo(
+            'note: without MuJoCo the closed loop is left out (pip install "copsense[sim]").',
+            err=True,
+        )
+        static = True
     command = f"copsense {shlex.join(sys.argv[1:])}"
     form = "{desc} {n}/{total} [{elapsed}]"
     # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
@@ -57,6 +67,11 @@ def reproduce(output: str, postures: int, limits: str | None, force: bool, quiet
                 bar.set_description_str(stage, refresh=False)
             bar.update(done - bar.n)
 
-        result = compute(postures=postures, limits=within, progress=show)
+        result = compute(
+            postures=postures,
+            limits=within,
+            sway_frequency=None if static else SWAY_FREQUENCY,
+            progress=show,
+        )
         path = write_report(result, output, overwrite=force, command=command)
     click.echo(str(path))

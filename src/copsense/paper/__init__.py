@@ -36,6 +36,8 @@ from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
 from copsense.paper.lateral import LateralSweep, Series
 from copsense.paper.linkage import Hand
 from copsense.paper.printed import PRINTED_FORMS, PrintedForm
+from copsense.paper.sway import Stretch, Sway, completed, stretch, tip_travel
+from copsense.paper.sway_claims import SWAY_CLAIMS, evaluate_sway_claims
 
 __all__ = [
     "ERRATA",
@@ -43,6 +45,7 @@ __all__ = [
     "FOUR_BAR_CRITERIA",
     "ICUB_CLAIMS",
     "PRINTED_FORMS",
+    "SWAY_CLAIMS",
     "CheckedClaim",
     "Claim",
     "Curve",
@@ -62,12 +65,16 @@ __all__ = [
     "Sampling",
     "Segment",
     "Series",
+    "Stretch",
+    "Sway",
     "Verdict",
     "compare_with_reference",
+    "completed",
     "evaluate_claims",
     "evaluate_errata",
     "evaluate_four_bar_claims",
     "evaluate_icub_claims",
+    "evaluate_sway_claims",
     "figure_3a",
     "figure_3b",
     "figure_4",
@@ -75,4 +82,6 @@ __all__ = [
     "judge",
     "solve_four_bar",
     "solve_four_bar_member",
+    "stretch",
+    "tip_travel",
 ]

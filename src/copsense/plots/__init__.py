@@ -28,6 +28,12 @@ from copsense.plots.saving import render_figure, save_figure
 from copsense.plots.soles import plot_soles
 from copsense.plots.stance import plot_stance
 from copsense.plots.summary import plot_results
+from copsense.plots.sway import (
+    plot_sway_cop,
+    plot_sway_hip_roll,
+    plot_sway_limits,
+    plot_sway_load,
+)
 
 __all__ = [
     "plot_cop",
@@ -47,6 +53,10 @@ __all__ = [
     "plot_sensitivity",
     "plot_soles",
     "plot_stance",
+    "plot_sway_cop",
+    "plot_sway_hip_roll",
+    "plot_sway_limits",
+    "plot_sway_load",
     "plot_torques",
     "plot_travel",
     "plot_unit_of_length",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from copsense.report.figures import ReportFigure, report_figures
+from copsense.report.figure import ReportFigure
+from copsense.report.figures import report_figures
 from copsense.report.page import render_page
 from copsense.report.writing import check_report_folder, write_report
 

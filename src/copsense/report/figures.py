@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 import xarray as xr
 
@@ -26,33 +23,11 @@ from copsense.plots import (
     plot_unit_of_length,
 )
 from copsense.plots.style import Figure
+from copsense.report.figure import ReportFigure
+from copsense.report.sway import sway_figures
 from copsense.reproduction import Reproduction
 
 _CEILING = 30.0  # mm/deg: Fig. 5 has a pole
-
-
-@dataclass(frozen=True)
-class ReportFigure:
-    """One figure of the report.
-
-    Attributes:
-        name: file name without suffix.
-        section: where it stands: ``"overview"``, ``"four-bar"``, ``"icub"`` or ``"beyond"``.
-        title: its number or name.
-        caption: what to see in it.
-        alt: what it shows, for who cannot see it.
-        shape: ``"half"`` of the page's width, ``"wide"``, or ``"alone"``, half with its caption
-            beside it.
-        draw: draws it.
-    """
-
-    name: str
-    section: str
-    title: str
-    caption: str
-    alt: str
-    draw: Callable[[], Figure]
-    shape: str = "half"
 
 
 def report_figures(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
@@ -63,6 +38,7 @@ def report_figures(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
         *_icub(reproduction),
         *_beyond(reproduction),
         *_limits(reproduction),
+        *(sway_figures(reproduction.sway, reproduction.sway_claims) if reproduction.sway else ()),
     )
 
 

@@ -11,7 +11,8 @@ from jinja2 import Environment, StrictUndefined
 
 from copsense.binding import LimitChange
 from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
-from copsense.report.figures import ReportFigure
+from copsense.report.figure import ReportFigure
+from copsense.report.sway import sway_differences, sway_runs
 from copsense.report.typesetting import typeset
 from copsense.report.words import commands, differs, limit_words, limits, summary
 from copsense.reproduction import Reproduction
@@ -61,6 +62,11 @@ def render_page(
         claim_tables=(
             ("the four-bar linkage", "four-bar", _claims(reproduction.four_bar_claims)),
             ("the iCub", "icub", _claims(reproduction.icub_claims)),
+            *(
+                (("the iCub in closed loop", "closed-loop", _claims(reproduction.sway_claims)),)
+                if reproduction.sway
+                else ()
+            ),
         ),
         figures=shown,
         commands=commands(reproduction, command),
@@ -73,6 +79,8 @@ def render_page(
         limits=limits(reproduction),
         limit_words=limit_words(reproduction.within_limits.limits),
         bindings=[_binding(b) for b in reproduction.within_limits.bindings],
+        sway_runs=sway_runs(reproduction.sway) if reproduction.sway else [],
+        sway_differences=sway_differences(reproduction.sway) if reproduction.sway else (),
     )
 
 

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 
 from copsense.limits import Limits
-from copsense.paper import EvaluatedErratum, Verdict
+from copsense.paper import EvaluatedErratum, Sway, Verdict
 from copsense.paper.lateral import SHORT, TORQUE, WRENCH
 from copsense.reproduction import Reproduction
 
@@ -101,13 +101,18 @@ def limits(reproduction: Reproduction) -> tuple[str, ...]:
     lateral = facts.at(facts.series[WRENCH].slope[:, 0] / facts.hip_rate, 0.0)
     changed = ", ".join(reproduction.changed_at_sole)
     return (
-        "Static part only. Section V's figures are measurements on a robot under closed-loop "
-        "control; here each posture is an equilibrium. Velocities, the controller's feedback, "
-        "estimation of the contact forces and sensor noise are not in it.",
+        "Section V's figures are measurements on a robot under closed-loop control. "
+        + (
+            "Here the claims are judged twice: on equilibria, and in closed loop in simulation; "
+            "estimation of the contact forces, joint friction and sensor noise are in neither."
+            if reproduction.sway
+            else "Here each posture is an equilibrium: velocities, the controller's feedback, "
+            "estimation of the contact forces and sensor noise are not in it."
+        ),
         "No measured data are at hand, so nothing here is compared with the hardware; the claims "
         "of Section V are judged by whether they hold for the quasi-static motion they describe.",
-        "The amplitude of the CoM's sine is not printed. The sweep goes from over one foot to over "
-        "the other, as the text describes the motion.",
+        "The amplitude of the CoM's sine is not printed. The static sweep goes from over one foot "
+        "to over the other, as the text describes the motion.",
         "Outside the section on limits none are enforced on the wrenches (Remark 4): where a CoP "
         "leaves its sole, a controller with limits would keep it there and share the load "
         "differently.",
@@ -123,6 +128,16 @@ def limits(reproduction: Reproduction) -> tuple[str, ...]:
         f"{facts.other_slope:.3f} where the joint itself is swept.",
         '"Almost", "together" and "constant" are read as within a twentieth, "similar" and '
         '"about" as within a tenth; each claim\'s explanation states its tolerance.',
+    )
+
+
+def _balance_commands(sway: Sway | None) -> tuple[str, ...]:
+    if sway is None:
+        return ()
+    sine = f"--reference sine:{sway.amplitude:g}:{sway.frequency:g}"
+    return tuple(
+        f"copsense balance icub --criterion {name} {sine} --output {name}.nc --plot {name}.png"
+        for name in ("minimum-wrench", "minimum-torque")
     )
 
 
@@ -153,6 +168,7 @@ def commands(reproduction: Reproduction, command: str) -> dict[str, tuple[str, .
             f"copsense analyse icub --limits {within}",
             f"copsense design icub --family joints --limits {within}",
         ),
+        "closed-loop": _balance_commands(reproduction.sway),
         "beyond": (
             f"copsense sweep icub {span} --criterion minimum-wrench "
             f"--characteristic-length {facts.half:g} --output icub_short.nc",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable
@@ -17,7 +18,7 @@ from copsense.plots import render_figure
 from copsense.report.figures import report_figures
 from copsense.report.page import render_page
 from copsense.reproduction import Reproduction
-from copsense.storage import write_results
+from copsense.storage import write_recording, write_results
 
 PAGE = "report.html"
 _FOLDERS = ("figures", "data")
@@ -105,6 +106,10 @@ def _write_data(reproduction: Reproduction, folder: Path) -> None:
     write_results(reproduction.lateral, folder / "icub_lateral.csv")
     write_results(reproduction.lateral_at_sole, folder / "icub_lateral_at_sole.nc")
     write_results(reproduction.within_limits.lateral, folder / "icub_within_limits.nc")
+    if reproduction.sway:
+        for name, recording in reproduction.sway.runs.items():
+            plain = re.sub(r"[^a-z]+", "_", name)
+            write_recording(recording, folder / f"closed_loop_{plain}.nc")
     _write_json(
         folder / "claims.json",
         [

@@ -1,0 +1,83 @@
+"""Section V in closed loop: the claims hold on a shorter sway, and fail where they should."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from reproductions import small_reproduction
+
+import copsense
+from copsense.closed_loop import sway_in_simulation
+from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel
+from copsense.report import report_figures, write_report
+from copsense.reproduction import LIMITS
+
+WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
+
+
+@pytest.fixture(scope="module")
+def sway():
+    stance = copsense.load_stance("icub")
+    within = replace(LIMITS, cop_margin=3e-3)
+    return sway_in_simulation(
+        stance,
+        WRENCH,
+        TORQUE,
+        within,
+        amplitude=0.041,
+        limited_amplitude=0.05,
+        frequency=0.1,
+        periods=0.5,
+    )
+
+
+def verdicts(sway):
+    return {c.claim.identifier: c.verdict for c in evaluate_sway_claims(sway)}
+
+
+def test_every_claim_of_section_v_holds_in_closed_loop(sway):
+    # At twice the speed of the report's sway the CoP runs ahead of the static one.
+    found = verdicts(sway)
+    assert {name for name, v in found.items() if v is not Verdict.HOLDS} <= {"loop-quasi-static"}
+
+
+def test_minimum_wrench_tips_on_either_side_near_the_static_prediction(sway):
+    for run, side in ((sway.left, 1), (sway.right, -1)):
+        predicted = float(run.attrs["static_excursion"])
+        assert np.sign(predicted) == side
+        assert abs(tip_travel(run) - predicted) < 2.5e-3
+    assert tip_travel(sway.left) == pytest.approx(-tip_travel(sway.right), abs=2e-4)
+
+
+def test_measured_cops_are_the_static_ones_but_for_the_acceleration(sway):
+    # An accelerated CoM moves the ZMP by -h/g a, and the CoPs with it.
+    found = stretch(sway.torque)
+    w = 2 * np.pi * sway.frequency
+    lead = 0.6 / 9.8 * w**2 * sway.amplitude
+    assert np.abs(found.cop - found.static_cop).max() < 2.5 * lead
+
+
+def test_claims_fail_on_other_recordings(sway):
+    swapped = replace(sway, left=sway.torque, torque=sway.left)
+    found = verdicts(swapped)
+    assert found["loop-half-weight"] is Verdict.DOES_NOT_HOLD
+    assert found["loop-full-period"] is Verdict.DOES_NOT_HOLD
+    assert found["loop-parallel"] is Verdict.DOES_NOT_HOLD
+    tipping = replace(sway, limited={"minimum-wrench": sway.left})
+    assert verdicts(tipping)["loop-limits"] is Verdict.DOES_NOT_HOLD
+
+
+def test_the_report_shows_the_closed_loop(sway, tmp_path):
+    claims = evaluate_sway_claims(sway)
+    reproduction = replace(small_reproduction(), sway=sway, sway_claims=claims)
+    names = {f.name for f in report_figures(reproduction)}
+    assert {"loop_6a", "loop_6b", "loop_7a", "loop_7b", "loop_8", "loop_9b"} <= names
+    page = write_report(reproduction, tmp_path / "report").read_text(encoding="utf-8")
+    assert 'id="closed-loop"' in page
+    assert "r_sole tips at" in page
+    assert "copsense balance icub --criterion minimum-wrench --reference sine:0.041:0.1" in page
+    recorded = sorted(p.name for p in (tmp_path / "report" / "data").glob("closed_loop_*.nc"))
+    assert len(recorded) == 5
+    assert 'id="closed-loop"' not in write_report(
+        small_reproduction(), tmp_path / "static"
+    ).read_text(encoding="utf-8")
