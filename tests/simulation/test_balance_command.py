@@ -3,8 +3,12 @@
 import sys
 from pathlib import Path
 
+import imageio_ffmpeg
+import numpy as np
 import pytest
 
+from copsense.errors import CopsenseError
+from copsense.simulation.video import check_video
 from copsense.storage import load_recording
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
@@ -38,6 +42,72 @@ def test_a_tip_is_told_beside_the_prediction():
     assert summary["first_tip"]["com_y_from_start"] == pytest.approx(predicted, abs=1.5e-3)
 
 
+OWN = """
+import numpy as np
+
+def limp(observation):
+    return np.zeros(12)
+
+def short(observation):
+    return np.zeros(3)
+
+def wild(observation):
+    return np.full(12, np.nan)
+"""
+
+
+def test_a_users_controller_from_the_command(tmp_path, monkeypatch):
+    (tmp_path / "own_module_of_the_command.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    run = ("balance", "solo12", "--duration", 0.8, "--controller")
+    limp = copsense(*run, "own_module_of_the_command:limp", "--json")
+    assert limp.code == 1
+    assert limp.json["end"]["kind"] == "fall"
+    assert limp.json["static_prediction"]["excursion"] is None
+    for name, says in (("short", "(12,)"), ("wild", "finite")):
+        answer = copsense(*run, f"own_module_of_the_command:{name}")
+        assert says in answer.error
+        assert "at 0.000 s" in answer.error
+
+
+def test_disturbances_from_the_command():
+    answer = copsense(
+        "balance", "icub", "--duration", 0.3, "--payload", "l_hand=0.5", "--mass-error", 2,
+        "--friction", "0.5:0.1:l_sole", "--force-noise", 0.5, "--moment-noise", 0.01,
+        "--wrenches", "sensors", "--odometry", "loaded", "--gains", "public", "--json",
+    )  # fmt: skip
+    assert answer.code == 0, answer.err
+    assert answer.json["end"]["kind"] == "completed"
+
+
+def test_a_run_is_filmed(tmp_path):
+    try:
+        check_video()
+    except CopsenseError as error:
+        pytest.skip(str(error))
+    film = tmp_path / "run.mp4"
+    answer = copsense("balance", "icub", "--duration", 0.3, "--video", film)
+    assert answer.code == 0, answer.err
+    assert b"ftyp" in film.read_bytes()[:16]
+    reader = imageio_ffmpeg.read_frames(str(film))
+    size = next(reader)["size"]
+    frames = [np.frombuffer(frame, dtype=np.uint8).reshape(*size[::-1], 3) for frame in reader]
+    assert len(frames) >= 8
+    # Something stands in the middle of the picture, on a ground of another colour.
+    assert frames[0][:, size[0] // 3 : 2 * size[0] // 3].std() > 5
+    assert "exists already" in copsense("balance", "icub", "--video", film).error
+
+
+def test_without_an_off_screen_the_remedy_is_named(tmp_path, monkeypatch):
+    def nothing(*_):
+        raise RuntimeError("no display")
+
+    monkeypatch.setattr("mujoco.Renderer", nothing)
+    answer = copsense("balance", "icub", "--video", tmp_path / "run.mp4")
+    assert "MUJOCO_GL" in answer.error
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -51,6 +121,13 @@ def test_a_tip_is_told_beside_the_prediction():
         (["--duration", "-1"], "duration"),
         (["--criterion", "minimum-wrench", "--criterion", "minimum-torque"], "one criterion"),
         (["--output", "run.txt"], "suffix"),
+        (["--friction", "ice"], "MU[:START[:CONTACT]]"),
+        (["--friction", "0.1:0:wing"], "wing"),
+        (["--payload", "wing=1"], "wing"),
+        (["--mass-error", "-100"], "nothing would be left"),
+        (["--odometry", "loaded"], "point contact"),
+        (["--controller", "nowhere"], "MODULE:ATTRIBUTE"),
+        (["--video", "run.gif"], "suffix"),
     ],
 )
 def test_bad_options_are_one_clear_line(options, says):

@@ -11,22 +11,27 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
+from copsense.cli.disturbances import (
+    REFERENCES,
+    disturbance_options,
+    read_disturbances,
+    read_signal,
+)
 from copsense.cli.options import (
     criterion_options,
     echo_json,
-    read_assignments,
     read_criteria,
     read_limits,
     read_stance,
     stance_options,
 )
-from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from copsense.controllers import Signal
-    from copsense.simulation import Push
-
-_REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m/s]"
+    from copsense.controllers import Controller
+    from copsense.criterion import Criterion
+    from copsense.limits import Limits
+    from copsense.stance import Stance
 
 
 @click.command(
@@ -35,22 +40,16 @@ _REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m
 )
 @stance_options
 @criterion_options
+@disturbance_options
 @click.option(
     "--reference",
     default="hold",
     show_default=True,
     metavar="SIGNAL",
-    help=f"How far to the left the CoM goes: {_REFERENCES}.",
+    help=f"How far to the left the CoM goes: {REFERENCES}.",
 )
 @click.option(
     "--duration", type=float, metavar="S", help="Default: one period, the ramp and 1 s, or 2 s."
-)
-@click.option(
-    "--push",
-    "pushes",
-    multiple=True,
-    metavar="FX:FY:FZ[:START[:DURATION[:FRAME]]]",
-    help="Push [N], world axes, at START [s] for DURATION [s] on a frame. Repeatable.",
 )
 @click.option(
     "--gains",
@@ -59,18 +58,19 @@ _REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m
     show_default=True,
     help="Gains: stiff, or soft ones like those the authors published.",
 )
-@click.option("--delay", type=float, default=0.0, metavar="S", help="Delay of the torques [s].")
-@click.option("--bandwidth", type=float, metavar="HZ", help="Bandwidth of the torques [Hz].")
 @click.option(
-    "--torque-limit",
-    "torque_limits",
-    multiple=True,
-    metavar="[JOINT=]NM",
-    help="Motors give no more: a number for all, model, or JOINT=NM. Repeatable.",
+    "--controller",
+    metavar="MODULE:NAME",
+    help="Your controller instead: a class made of the stance, or a function observation -> "
+    "torques. A --criterion is then for the static prediction.",
 )
-@click.option("--position-noise", type=float, default=0.0, metavar="RAD", help="Of the joints.")
-@click.option("--velocity-noise", type=float, default=0.0, metavar="RAD/S", help="Of the joints.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of everything random.")
+@click.option(
+    "--wrenches",
+    type=click.Choice(["contacts", "sensors"]),
+    default="contacts",
+    show_default=True,
+    help="Measure wrenches as the engine's contact forces, or by six-axis sensors over the feet.",
+)
 @click.option(
     "--until",
     type=click.Choice(["tip", "fall"]),
@@ -80,6 +80,7 @@ _REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m
 )
 @click.option("--output", type=click.Path(), help="Write the recording: .nc.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
+@click.option("--video", type=click.Path(), help="Film it, off-screen: .mp4.")
 @click.option("--force", is_flag=True, help="Overwrite the outputs.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def balance(
@@ -89,17 +90,13 @@ def balance(
     limits: str | None,
     reference: str,
     duration: float | None,
-    pushes: tuple[str, ...],
     gains: str,
-    delay: float,
-    bandwidth: float | None,
-    torque_limits: tuple[str, ...],
-    position_noise: float,
-    velocity_noise: float,
-    seed: int,
+    controller: str | None,
+    wrenches: Any,
     until: Any,
     output: str | None,
     picture: str | None,
+    video: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -110,8 +107,8 @@ def balance(
     how well the CoM was tracked, the smallest margins, which contact tipped first beside the
     static prediction, and whether the robot fell. Exit code 1 where it did not go to the end.
     """
-    from copsense.controllers import STIFF, BalancingController, lateral_reference, public_gains
-    from copsense.simulation import Motors, MujocoSimulator, Noise, Scenario, rollout
+    from copsense.controllers import lateral_reference
+    from copsense.simulation import MujocoSimulator, Scenario, rollout
     from copsense.simulation.prediction import predict
     from copsense.storage import check_output, write_recording
 
@@ -124,34 +121,35 @@ def balance(
         check_output(output, suffixes=(".nc",), overwrite=force)
     if picture is not None:
         check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    if video is not None:
+        from copsense.simulation.video import check_video
+
+        check_output(video, suffixes=(".mp4",), overwrite=force)
+        check_video()
     (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
-    signal, natural = _read_signal(reference)
-    motors = Motors(delay, bandwidth, _read_torque_limits(torque_limits))
+    signal, natural = read_signal(reference)
     scenario = Scenario(
         natural if duration is None else duration,
         signal,
-        tuple(_read_push(text) for text in pushes),
-        motors,
-        Noise(position_noise, velocity_noise),
-        seed=seed,
         name=reference,
+        **read_disturbances(options),
     )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
-    scenario.check_robot(stance.robot)
-    simulator = MujocoSimulator(stance)
-    chosen = STIFF if gains == "stiff" else public_gains(stance.robot)
-    controller = BalancingController(stance, criterion, chosen, limits=allowed)
+    scenario.check_stance(stance)
+    simulator = MujocoSimulator(stance, wrenches=wrenches)
+    law = _controller(stance, controller, criterion, gains, allowed)
     path = lateral_reference(stance, signal)
     total = round(scenario.duration / scenario.control_period)
     with tqdm(total=total, desc="balancing", unit="ms", disable=None, leave=False) as bar:
         recording = rollout(
             simulator,
-            controller,
+            law,
             replace(scenario, reference=path),
             until=until,
             progress=bar.update,
         )
-    recording = predict(path, criterion, allowed).attach(recording)
+    if controller is None or criteria:  # of a user's own law the analysis knows nothing
+        recording = predict(path, criterion, allowed).attach(recording)
     recording.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
     if output is not None:
         write_recording(recording, output, overwrite=force)
@@ -159,70 +157,28 @@ def balance(
         from copsense.plots import plot_rollout, save_figure
 
         save_figure(plot_rollout(recording), picture, overwrite=force)
+    if video is not None:
+        from copsense.simulation.video import write_video
+
+        with tqdm(desc="filming", unit="frame", disable=None, leave=False) as bar:
+            write_video(stance, recording, video, overwrite=force, progress=bar.update)
     summary = _summary(recording)
     if as_json:
         echo_json(summary)
     else:
-        _print(summary, [path for path in (output, picture) if path])
+        _print(summary, [path for path in (output, picture, video) if path])
     click.get_current_context().exit(0 if summary["end"]["kind"] == "completed" else 1)
 
 
-def _read_signal(text: str) -> tuple[Signal, float]:
-    """A reference and how long it naturally lasts [s]."""
-    from copsense.controllers import Hold, Ramp, Sine
+def _controller(
+    stance: Stance, own: str | None, criterion: Criterion, gains: str, limits: Limits | None
+) -> Controller:
+    from copsense.controllers import STIFF, BalancingController, load_controller, public_gains
 
-    kind, _, rest = text.partition(":")
-    if kind not in ("hold", "sine", "ramp"):
-        raise UnknownNameError("reference", kind, ("hold", "sine", "ramp"))
-    try:
-        numbers = [float(part) for part in rest.split(":")] if rest else []
-        if kind == "hold" and not numbers:
-            return Hold(), 2.0
-        if kind == "sine" and len(numbers) == 2:
-            sine = Sine(*numbers)
-            return sine, 1.0 / sine.frequency
-        if kind == "ramp" and len(numbers) in (1, 2):
-            ramp = Ramp(*numbers)
-            return ramp, ramp.duration + 1.0
-    except ValueError as error:
-        if isinstance(error, InvalidInputError):
-            raise
-    raise InvalidInputError(f"the reference {text!r} is not understood. Give {_REFERENCES}.")
-
-
-def _read_push(text: str) -> Push:
-    from copsense.simulation import Push
-
-    try:
-        x, y, z, *rest = text.split(":")
-        force = float(x), float(y), float(z)
-        extra: dict[str, Any] = {}
-        if rest:
-            extra["start"] = float(rest[0])
-        if len(rest) > 1:
-            extra["duration"] = float(rest[1])
-        if len(rest) > 2:
-            extra["frame"] = ":".join(rest[2:])
-    except ValueError:
-        raise InvalidInputError(
-            f"the push {text!r} is not understood. Give FX:FY:FZ[:START[:DURATION[:FRAME]]], such "
-            "as 0:40:0:0.5:0.1."
-        ) from None
-    return Push(force, **extra)
-
-
-def _read_torque_limits(texts: tuple[str, ...]) -> Any:
-    """A number or ``model`` for all, or joint -> limit."""
-    if len(texts) == 1 and "=" not in texts[0]:
-        if texts[0] == "model":
-            return "model"
-        try:
-            return float(texts[0])
-        except ValueError:
-            raise InvalidInputError(
-                f"the torque limit {texts[0]!r} is not understood. Give Nm, model or JOINT=NM."
-            ) from None
-    return read_assignments(texts) or None
+    if own is not None:
+        return load_controller(own, stance)
+    chosen = STIFF if gains == "stiff" else public_gains(stance.robot)
+    return BalancingController(stance, criterion, chosen, limits=limits)
 
 
 def _summary(recording: Any) -> dict[str, Any]:
@@ -260,8 +216,8 @@ def _summary(recording: Any) -> dict[str, Any]:
             "com_y_from_start": tip_y - start,
         },
         "static_prediction": {
-            "excursion": attributes["static_excursion"],
-            "contact": attributes["static_contact"],
+            "excursion": attributes.get("static_excursion", math.nan),
+            "contact": attributes.get("static_contact", ""),
         },
     }
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_array, finite_number
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
+from copsense.stance import Stance
 
 
 @dataclass(frozen=True)
@@ -99,21 +101,102 @@ class Motors:
 
 @dataclass(frozen=True)
 class Noise:
-    """Gaussian noise of the joint sensors; the base is known.
+    """Gaussian noise of the sensors; the base is known, or follows from the joints by odometry.
 
     Attributes:
         position: standard deviation of joint positions [rad, m].
         velocity: standard deviation of joint velocities [rad/s, m/s].
+        force: standard deviation of measured contact forces [N].
+        moment: standard deviation of measured contact moments [Nm].
     """
 
     position: float = 0.0
     velocity: float = 0.0
+    force: float = 0.0
+    moment: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse a deviation that is none."""
-        for name in ("position", "velocity"):
+        for name in ("position", "velocity", "force", "moment"):
             if finite_number(getattr(self, name), f"the {name} noise") < 0:
                 raise InvalidInputError(
                     f"the {name} noise is {getattr(self, name)}. Give a standard deviation, 0 or "
                     "more."
                 )
+
+
+@dataclass(frozen=True)
+class FrictionChange:
+    """The ground becomes slippery, or rougher, at a time.
+
+    Attributes:
+        friction: Coulomb coefficient from then on.
+        start: [s].
+        contact: name of the contact whose ground changes; default every one's.
+    """
+
+    friction: float
+    start: float = 0.0
+    contact: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no ground is."""
+        if finite_number(self.friction, "the friction of the ground") < 0:
+            raise InvalidInputError(
+                f"the friction of the ground is {self.friction}. Give a coefficient, 0 or more."
+            )
+        if finite_number(self.start, "the start of a change of friction [s]") < 0:
+            raise InvalidInputError(
+                f"a change of friction starts at {self.start} s. Give a time from 0 on."
+            )
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """How the robot in simulation differs from the model that the controller computes with.
+
+    Attributes:
+        mass: every link is heavier by this share (negative: lighter), its inertia with it.
+        payload: frame -> point mass fixed at its origin [kg].
+    """
+
+    mass: float = 0.0
+    payload: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Refuse masses that no robot has."""
+        if not finite_number(self.mass, "the error of the mass") > -1:
+            raise InvalidInputError(
+                f"the error of the mass is {self.mass:g}: nothing would be left. Give more than -1."
+            )
+        for frame, mass in self.payload.items():
+            finite_number(mass, f"the payload at {frame!r} [kg]", positive=True)
+
+    def __bool__(self) -> bool:
+        """Whether there is any."""
+        return bool(self.mass or self.payload)
+
+    def applied(self, stance: Stance) -> Stance:
+        """The stance of the robot as it really is.
+
+        Raises:
+            UnknownNameError: a payload hangs on no frame of the robot.
+        """
+        robot = stance.robot
+        for frame in self.payload:
+            if frame not in robot.frame_names:
+                raise UnknownNameError(
+                    f"frame for a payload on robot {robot.name!r}", frame, robot.frame_names
+                )
+        model = robot.model.copy()
+        for i in range(1, model.njoints):
+            inertia = model.inertias[i]
+            scale = 1.0 + self.mass
+            model.inertias[i] = pin.Inertia(
+                scale * inertia.mass, inertia.lever, scale * inertia.inertia
+            )
+        for name, mass in self.payload.items():
+            frame = robot.frame(name)
+            point = pin.Inertia(mass, frame.placement.translation, np.zeros((3, 3)))
+            model.inertias[frame.parentJoint] += point
+        return Stance(replace(robot, model=model), stance.q, stance.contacts)

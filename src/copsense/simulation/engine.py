@@ -14,7 +14,12 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.contact import Contact
-from copsense.errors import EngineMismatchError, InvalidInputError, MissingExtraError
+from copsense.errors import (
+    EngineMismatchError,
+    InvalidInputError,
+    MissingExtraError,
+    UnknownNameError,
+)
 from copsense.robot import Robot
 from copsense.simulation.settings import PhysicsSettings
 from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
@@ -36,6 +41,9 @@ class MujocoSimulator:
     Args:
         stance: robot, start configuration and contacts.
         settings: time step and contact model.
+        wrenches: how contact wrenches are measured: ``"contacts"`` sums the engine's contact
+            forces; ``"sensors"`` reads a six-axis sensor between each foot and the joint above it
+            and adds the foot's weight, as a robot does.
 
     Raises:
         MissingExtraError: mujoco is not installed.
@@ -43,11 +51,21 @@ class MujocoSimulator:
         EngineMismatchError: MuJoCo sees another robot than Pinocchio.
     """
 
-    def __init__(self, stance: Stance, settings: PhysicsSettings | None = None) -> None:
+    def __init__(
+        self,
+        stance: Stance,
+        settings: PhysicsSettings | None = None,
+        *,
+        wrenches: str = "contacts",
+    ) -> None:
         """Build the model and compare the engines."""
+        if wrenches not in ("contacts", "sensors"):
+            raise UnknownNameError("source of wrenches", wrenches, ("contacts", "sensors"))
         self._stance, self.settings = stance, settings or PhysicsSettings()
-        self._mujoco = _mujoco()
-        self._model = _build(self._mujoco, stance, self.settings)
+        self._mujoco = load_mujoco()
+        self._source = wrenches
+        self._feet = _feet(stance) if wrenches == "sensors" else ()
+        self._model = _build(self._mujoco, stance, self.settings, sensors=bool(self._feet))
         self._data = self._mujoco.MjData(self._model)
         joints = [self._model.joint(name) for name in stance.robot.joint_names]
         self._columns = np.concatenate([np.arange(6), [int(j.dofadr[0]) for j in joints]])
@@ -66,6 +84,9 @@ class MujocoSimulator:
             for k, (c, world) in enumerate(zip(stance.contacts, stance.placements, strict=True))
             if c.kind == "point"
         }
+        under = self._model.pair_geom2[: self._model.npair]
+        self._contact_of_pair = self._contact_of[under]
+        self._friction = self._model.pair_friction.copy()
         self._compare()
         self.reset()
 
@@ -82,6 +103,7 @@ class MujocoSimulator:
     def reset(self) -> Snapshot:
         """Put the robot at rest at the stance's configuration, time zero."""
         self._mujoco.mj_resetData(self._model, self._data)
+        self._model.pair_friction[:] = self._friction
         self._move(self._stance.q, np.zeros(self._stance.robot.model.nv))
         self._mujoco.mj_forward(self._model, self._data)
         # No solution to start from: the same start gives the same run.
@@ -117,6 +139,17 @@ class MujocoSimulator:
             raise SimulatorStoppedError("the motion is not finite any more", before)
         return self._snapshot(measured=True)
 
+    def set_friction(self, friction: float, contact: str | None = None) -> None:
+        """Change the ground's friction, under one contact or all, until the next reset."""
+        chosen = np.ones(len(self._contact_of_pair), dtype=bool)
+        if contact is not None:
+            chosen = self._contact_of_pair == self._stance.contact_names.index(contact)
+        self._model.pair_friction[chosen, :2] = friction
+
+    def altered(self, stance: Stance) -> MujocoSimulator:
+        """The same simulator of another robot on the same contacts."""
+        return MujocoSimulator(stance, self.settings, wrenches=self._source)
+
     def _move(self, q: np.ndarray, v: np.ndarray) -> None:
         """Pinocchio's configuration and velocity into MuJoCo's."""
         x, y, z, w = q[3:7]
@@ -145,7 +178,8 @@ class MujocoSimulator:
         positions = data.site_xpos[self._sites].copy()
         wrenches = np.zeros((len(self._sites), 6))
         if measured:
-            wrenches = self._wrenches(positions, rotations)
+            measure = self._sensed if self._feet else self._wrenches
+            wrenches = measure(positions, rotations)
         return Snapshot(float(data.time), q, v, wrenches, positions, rotations)
 
     def _wrenches(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
@@ -168,6 +202,23 @@ class MujocoSimulator:
             rotations[k], moments[k] = axes, 0.0  # a point has no moment but its radius's
         turned = np.stack([forces, moments], axis=1) @ rotations
         return np.asarray(turned.reshape(len(self._sites), 6))
+
+    def _sensed(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
+        """What six-axis sensors over the feet tell of the contacts: their reading and the weight.
+
+        Exact at rest; in motion the foot's own acceleration is missing, as on a robot.
+        """
+        # The sensor reads what the link above does to the foot, about the contact frame.
+        wrenches = -self._data.sensordata.reshape(len(self._feet), 6)
+        gravity = self._stance.robot.model.gravity.linear
+        for k, (mass, lever) in enumerate(self._feet):
+            R = rotations[k]
+            weight = R.T @ (mass * gravity)
+            wrenches[k] -= np.concatenate([weight, np.cross(lever, weight)])
+        for k, axes in self._fixed_axes.items():
+            wrenches[k, :3] = axes.T @ rotations[k] @ wrenches[k, :3]
+            wrenches[k, 3:] = 0.0
+        return wrenches
 
     def _compare(self) -> None:
         """Compare the engines at the start and at a posture and motion nearby."""
@@ -220,7 +271,8 @@ def _quiet(message: str) -> None:
     """Warnings are read from the engine's counters."""
 
 
-def _mujoco() -> Any:
+def load_mujoco() -> Any:
+    """The engine's package, an extra."""
     try:
         import mujoco
     except ImportError:
@@ -233,7 +285,24 @@ def _circles(robot: Robot) -> list[tuple[int, bool]]:
     return [(joint.idx_q, joint.nq == 2) for joint in list(robot.model.joints)[2:]]
 
 
-def _build(mujoco: Any, stance: Stance, settings: PhysicsSettings) -> Any:
+def _feet(stance: Stance) -> tuple[tuple[float, np.ndarray], ...]:
+    """Mass of the link of each contact, and its centre in the contact frame [m]."""
+    robot, found, links = stance.robot, [], set()
+    for contact in stance.contacts:
+        frame = robot.frame(contact.frame)
+        if frame.parentJoint in links or frame.parentJoint < 2:
+            raise InvalidInputError(
+                f"contact {contact.name!r} shares its link with another contact, or is on the "
+                'base: a sensor cannot tell them apart. Measure wrenches from "contacts".'
+            )
+        links.add(frame.parentJoint)
+        place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+        inertia = robot.model.inertias[frame.parentJoint]
+        found.append((float(inertia.mass), place.actInv(inertia.lever)))
+    return tuple(found)
+
+
+def _build(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, sensors: bool) -> Any:
     """The compiled MuJoCo model of a stance."""
     robot, model = stance.robot, stance.robot.model
     if model.joints[1].shortname() != "JointModelFreeFlyer":
@@ -255,6 +324,13 @@ def _build(mujoco: Any, stance: Stance, settings: PhysicsSettings) -> Any:
         bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])
     for contact, world in zip(stance.contacts, stance.placements, strict=True):
         _add_contact(mujoco, spec, bodies, robot, contact, world, settings)
+        for kind in ("FORCE", "TORQUE") if sensors else ():
+            spec.add_sensor(
+                name=f"{kind.lower()} of {contact.name}",
+                type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                objname=f"contact {contact.name}",
+            )
     try:
         return spec.compile()
     except ValueError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
@@ -14,9 +15,15 @@ from copsense.controllers.controller import Controller, Observation, ask, contro
 from copsense.controllers.target import PathReference, lateral_reference
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.simulation.actuation import Actuation
+from copsense.simulation.odometry import FootOdometry
 from copsense.simulation.recording import Recorder
 from copsense.simulation.scenario import Scenario
-from copsense.simulation.simulator import Simulator, SimulatorStoppedError, Snapshot
+from copsense.simulation.simulator import (
+    AlterableSimulator,
+    Simulator,
+    SimulatorStoppedError,
+    Snapshot,
+)
 from copsense.simulation.watch import Event, Thresholds, Watch
 from copsense.stance import Stance
 
@@ -57,16 +64,22 @@ def rollout(
     """
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
-    stance, dt = simulator.stance, simulator.time_step
-    robot, name = stance.robot, controller_name(controller)
-    n = len(robot.torque_names)
-    scenario.check_robot(robot)
+    believed, dt = simulator.stance, simulator.time_step
+    name, n = controller_name(controller), len(believed.robot.torque_names)
+    scenario.check_stance(believed)
     steps = scenario.steps_per_control(dt)
     reference = scenario.reference
     if not isinstance(reference, PathReference):
-        reference = lateral_reference(stance, reference)
+        reference = lateral_reference(believed, reference)
+    if scenario.model_error:
+        simulator = _alterable(simulator, "a model error").altered(
+            scenario.model_error.applied(believed)
+        )
+    changes = deque(scenario.friction)
+    ground = _alterable(simulator, "a change of friction") if changes else None
+    stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
-    sensors, pushes = _Sensors(scenario, stance), _Pushes(scenario, stance)
+    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance)
     watch, recorder = Watch(stance, thresholds or Thresholds()), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
@@ -80,6 +93,9 @@ def rollout(
     for number in range(count):
         time = number * scenario.control_period
         target = reference.at(time)
+        while ground is not None and changes and changes[0].start <= time + 1e-9:
+            change = changes.popleft()
+            ground.set_friction(change.friction, change.contact)
         q, v = sensors.read(now)
         try:
             observation = Observation(time, q, v, target, now.wrenches)
@@ -88,6 +104,7 @@ def rollout(
             for _ in range(steps):
                 torques = actuation.apply(command.torques)
                 now = simulator.step(torques, pushes.at(now))
+            now = sensors.measured(now)
         except ControllerError as error:
             if not len(recorder):
                 raise
@@ -131,22 +148,47 @@ def rollout(
     return dataset
 
 
+def _alterable(simulator: Simulator, what: str) -> AlterableSimulator:
+    if not isinstance(simulator, AlterableSimulator):
+        raise InvalidInputError(
+            f"{type(simulator).__name__} cannot simulate {what}: it has no altered() and "
+            "set_friction(). Use MujocoSimulator, or leave it out of the scenario."
+        )
+    return simulator
+
+
 class _Sensors:
-    """The state as the controller sees it."""
+    """The state as the controller sees it, and the wrenches as anybody does."""
 
     def __init__(self, scenario: Scenario, stance: Stance) -> None:
         self._noise, self._model = scenario.noise, stance.robot.model
         self._random = np.random.default_rng(scenario.seed)
-        self._quiet = not (self._noise.position or self._noise.velocity)
+        # Wrenches have a stream of their own: their noise leaves that of the joints as it was.
+        self._wrench_random = np.random.default_rng([scenario.seed, 1])
+        noise = self._noise
+        self._quiet = not (noise.position or noise.velocity)
+        self._spread = np.repeat([noise.force, noise.moment], 3)
+        self._odometry = (
+            None if scenario.odometry is None else FootOdometry(stance, scenario.odometry)
+        )
 
     def read(self, now: Snapshot) -> tuple[np.ndarray, np.ndarray]:
-        if self._quiet:
-            return now.q, now.v
-        n = self._model.nv - 6
-        turn, v = np.zeros(self._model.nv), now.v.copy()
-        turn[6:] = self._noise.position * self._random.standard_normal(n)
-        v[6:] += self._noise.velocity * self._random.standard_normal(n)
-        return pin.integrate(self._model, now.q, turn), v
+        q, v = now.q, now.v
+        if not self._quiet:
+            n = self._model.nv - 6
+            turn, v = np.zeros(self._model.nv), now.v.copy()
+            turn[6:] = self._noise.position * self._random.standard_normal(n)
+            v[6:] += self._noise.velocity * self._random.standard_normal(n)
+            q = pin.integrate(self._model, now.q, turn)
+        if self._odometry:
+            q, v = self._odometry.estimate(q, v, now.wrenches)
+        return q, v
+
+    def measured(self, now: Snapshot) -> Snapshot:
+        if not np.any(self._spread):
+            return now
+        noise = self._spread * self._wrench_random.standard_normal(now.wrenches.shape)
+        return replace(now, wrenches=now.wrenches + noise)
 
 
 class _Pushes:

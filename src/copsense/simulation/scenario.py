@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from copsense.arrays import finite_number
 from copsense.controllers.target import Hold, PathReference, Signal
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.robot import Robot
-from copsense.simulation.disturbance import Motors, Noise, Push
+from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
+from copsense.simulation.odometry import FootOdometry
+from copsense.stance import Stance
 
 _LONGEST = 3600.0  # s
 
@@ -23,7 +24,11 @@ class Scenario:
             `Ramp`), or a `PathReference` along any path.
         pushes: forces on links.
         motors: delay, bandwidth and limits of the torques.
-        noise: of the joint sensors.
+        noise: of the sensors.
+        friction: changes of the ground's friction, in time's order.
+        model_error: how the robot in simulation differs from the controller's model.
+        odometry: the foot that the base's state is estimated from, see `FootOdometry`; None for
+            the true state.
         control_period: time between two calls of the controller [s], a multiple of the physics'
             time step.
         seed: of everything random.
@@ -35,6 +40,9 @@ class Scenario:
     pushes: tuple[Push, ...] = ()
     motors: Motors = field(default_factory=Motors)
     noise: Noise = field(default_factory=Noise)
+    friction: tuple[FrictionChange, ...] = ()
+    model_error: ModelError = field(default_factory=ModelError)
+    odometry: str | None = None
     control_period: float = 1e-3
     seed: int = 0
     name: str = "scenario"
@@ -49,6 +57,9 @@ class Scenario:
             )
         pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
         object.__setattr__(self, "pushes", pushes)
+        changes = self.friction
+        changes = (changes,) if isinstance(changes, FrictionChange) else tuple(changes)
+        object.__setattr__(self, "friction", tuple(sorted(changes, key=lambda c: c.start)))
         if not hasattr(self.reference, "at"):
             raise InvalidInputError(
                 f"the reference {self.reference!r} is none. Give Hold(), Sine(amplitude, "
@@ -71,13 +82,21 @@ class Scenario:
             )
         return steps
 
-    def check_robot(self, robot: Robot) -> None:
-        """Refuse a scenario for joints or frames that the robot lacks.
+    def check_stance(self, stance: Stance) -> None:
+        """Refuse a scenario for joints, frames or contacts that the robot on its feet lacks.
 
         Raises:
             UnknownNameError: the message names the missing one and those there are.
         """
+        robot = stance.robot
         self.motors.limits(robot)
+        for change in self.friction:
+            if change.contact is not None and change.contact not in stance.contact_names:
+                raise UnknownNameError(
+                    "contact whose friction changes", change.contact, stance.contact_names
+                )
+        if self.odometry is not None:
+            FootOdometry(stance, self.odometry)
         for push in self.pushes:
             if push.frame not in robot.frame_names:
                 raise UnknownNameError(

@@ -88,3 +88,14 @@ class Simulator(Protocol):
         Raises:
             SimulatorStoppedError: the motion is not finite any more.
         """
+
+
+@runtime_checkable
+class AlterableSimulator(Simulator, Protocol):
+    """A simulator whose ground and robot may differ from what the controller believes."""
+
+    def set_friction(self, friction: float, contact: str | None = None) -> None:
+        """Change the ground's friction, under one contact or all, until the next reset."""
+
+    def altered(self, stance: Stance) -> Simulator:
+        """The same simulator of another robot on the same contacts."""

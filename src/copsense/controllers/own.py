@@ -1,0 +1,76 @@
+"""load_controller: a user's controller by its name, one class or one function."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from copsense.controllers.controller import Controller
+from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
+from copsense.stance import Stance
+
+
+def load_controller(source: str, stance: Stance) -> Controller:
+    """A controller from ``MODULE:ATTRIBUTE``, the module found here or installed.
+
+    Args:
+        source: names a class that is made of the stance, a function whose first parameter is
+            ``stance`` and which returns a controller, or a function observation -> torques.
+        stance: robot, contacts and posture it is to balance.
+
+    Raises:
+        InvalidInputError: not of that form, no such module, or nothing that can be called.
+        UnknownNameError: the module has no such attribute.
+        ControllerError: making it failed; the message says with what.
+    """
+    module_name, colon, attribute = source.partition(":")
+    if not (module_name and colon and attribute):
+        raise InvalidInputError(
+            f"the controller {source!r} is not understood. Give MODULE:ATTRIBUTE, such as "
+            "my_controller:MyController."
+        )
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:
+        raise InvalidInputError(
+            f"the controller's module {module_name!r} cannot be imported "
+            f"({type(error).__name__}: {error}). Mend it, run the command in its folder, or "
+            "install it."
+        ) from error
+    made: Any = getattr(module, attribute, None)
+    if made is None:
+        public = [
+            name
+            for name, value in vars(module).items()
+            if callable(value) and getattr(value, "__module__", "") == module_name
+        ]
+        raise UnknownNameError(f"controller in {module_name!r}", attribute, public)
+    if _made_of_a_stance(made):
+        try:
+            made = made(stance)
+        except Exception as error:
+            raise ControllerError(
+                f"{source} raised {type(error).__name__} when made of the stance: {error}. It is "
+                "called with the stance alone."
+            ) from error
+    if not callable(made) or isinstance(made, np.ndarray):
+        raise InvalidInputError(
+            f"{source} gives {made!r}, no controller. Give a callable observation -> torques."
+        )
+    return made
+
+
+def _made_of_a_stance(candidate: object) -> bool:
+    if inspect.isclass(candidate):
+        return True
+    if not inspect.isfunction(candidate):
+        return False
+    return next(iter(inspect.signature(candidate).parameters), "") == "stance"

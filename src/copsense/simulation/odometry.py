@@ -1,0 +1,78 @@
+"""FootOdometry: the base's state from the joints alone, by taking a foot to stand still."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.stance import Stance
+
+LOADED = "loaded"  # the foot that carries most
+
+
+class FootOdometry:
+    """Base pose and velocity under the assumption that a foot does not move.
+
+    What a robot without a tracker of its base does. Where that foot tips or slips, the estimate
+    goes with it. With ``"loaded"`` the foot is the one that carries most, by measured normal force;
+    a new one is taken to stand where the last estimate left it.
+
+    Args:
+        stance: robot and contacts; the feet stand where they do here.
+        contact: name of a surface contact, or ``"loaded"``.
+
+    Raises:
+        UnknownNameError: no such contact.
+        InvalidInputError: a point contact, which says nothing about the base's orientation.
+    """
+
+    def __init__(self, stance: Stance, contact: str) -> None:
+        """Look up the feet."""
+        names = [c.name for c in stance.contacts if c.kind == "surface"]
+        if not names:
+            raise InvalidInputError(
+                "odometry needs a foot with a sole: a point contact says nothing about the base's "
+                "orientation. Leave odometry out."
+            )
+        if contact not in (LOADED, *names):
+            raise UnknownNameError("foot for odometry", contact, (LOADED, *names))
+        self._fixed = None if contact == LOADED else names.index(contact)
+        surface = [k for k, c in enumerate(stance.contacts) if c.kind == "surface"]
+        self._rows, self._places = surface, [stance.placements[k] for k in surface]
+        self._model, self._data = stance.robot.model, stance.robot.model.createData()
+        self._feet = []
+        for k in surface:
+            c = stance.contacts[k]
+            frame = stance.robot.frame(c.frame)
+            place = frame.placement * pin.SE3(c.rotation, np.array(c.offset))
+            self._feet.append((int(frame.parentJoint), place))
+        self._foot = 0 if self._fixed is None else self._fixed
+
+    def estimate(
+        self,
+        q: Float[np.ndarray, " nq"],
+        v: Float[np.ndarray, " nv"],
+        wrenches: Float[np.ndarray, "nc 6"],
+    ) -> tuple[Float[np.ndarray, " nq"], Float[np.ndarray, " nv"]]:
+        """Configuration and velocity with the base's part estimated; that of `q`, `v` is unread."""
+        model, data = self._model, self._data
+        q, v = q.copy(), v.copy()
+        q[:7], v[:6] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 0.0
+        pin.computeJointJacobians(model, data, q)
+        seen = [data.oMi[joint] * place for joint, place in self._feet]
+        if self._fixed is None:
+            most = int(np.argmax(wrenches[self._rows, 2]))
+            if most != self._foot:
+                base = self._places[self._foot] * seen[self._foot].inverse()
+                self._places[most] = base * seen[most]
+                self._foot = most
+        foot = self._foot
+        base = self._places[foot] * seen[foot].inverse()
+        q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).normalized().coeffs()
+        joint, place = self._feet[foot]
+        J = pin.getFrameJacobian(model, data, joint, place, pin.ReferenceFrame.LOCAL)
+        # The foot stands: J_b v_b + J_j v_j = 0.
+        v[:6] = np.linalg.solve(J[:, :6], -J[:, 6:] @ v[6:])
+        return q, v

@@ -1,0 +1,224 @@
+"""What disturbs a robot: seeded, as it says, and seen by what should see it."""
+
+import numpy as np
+import pytest
+from standing import C1, C2, Statue, icub, simulator
+
+import copsense
+from copsense.controllers import BalancingController, load_controller, public_gains
+from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
+from copsense.simulation import (
+    FootOdometry,
+    FrictionChange,
+    ModelError,
+    Motors,
+    MujocoSimulator,
+    Noise,
+    Push,
+    Scenario,
+    rollout,
+)
+
+
+def run(scenario, criterion=C2, engine=None, gains=None):
+    gains = {} if gains is None else {"gains": gains}
+    controller = BalancingController(icub(), criterion, **gains)
+    return rollout(engine or simulator(), controller, scenario)
+
+
+def test_sensors_over_the_feet_read_the_contacts_wrenches_at_rest():
+    for stance in (icub(), copsense.load_stance("solo12")):
+        criterion = copsense.minimum_torque(tie_break=C1)
+        by = {
+            source: rollout(
+                MujocoSimulator(stance, wrenches=source),
+                BalancingController(stance, criterion),
+                Scenario(0.6),
+            )
+            for source in ("contacts", "sensors")
+        }
+        off = np.abs(by["sensors"]["wrench"] - by["contacts"]["wrench"]).values
+        assert off[-1].max() < 1e-3  # N, Nm: what still moves
+        # In motion the feet's own acceleration is missing: the sensors are no copy.
+        assert off[1:].max() > 1e-2
+
+
+def test_sensors_refuse_contacts_they_cannot_tell_apart():
+    stance = icub()
+    toe = copsense.Contact("l_sole", "point", name="toe", offset=(0.1, 0.0, -0.0105))
+    shared = copsense.Stance(stance.robot, stance.q, [*stance.contacts, toe])
+    with pytest.raises(InvalidInputError, match="shares its link"):
+        MujocoSimulator(shared, wrenches="sensors")
+    with pytest.raises(UnknownNameError, match="contacts"):
+        MujocoSimulator(stance, wrenches="sensor")
+
+
+def test_noise_of_the_wrenches_is_seeded_and_of_the_size_asked_for():
+    noisy = Scenario(0.5, noise=Noise(force=2.0, moment=0.1), seed=3)
+    first, again = run(noisy), run(noisy)
+    assert first.equals(again)
+    quiet = run(Scenario(0.5))
+    off = (first["wrench"] - quiet["wrench"]).values[20:]
+    assert off[..., :3].std() == pytest.approx(2.0, rel=0.15)
+    assert off[..., 3:].std() == pytest.approx(0.1, rel=0.15)
+    # The balancing controller reads no wrench: the motion is the same to the last bit.
+    assert first["com"].equals(quiet["com"])
+
+
+@pytest.mark.parametrize(
+    ("error", "mass"),
+    [(ModelError(mass=0.05), 1.05 * 33.061673), (ModelError(payload={"l_hand": 1.5}), 34.561673)],
+)
+def test_a_robot_heavier_than_believed_carries_its_true_weight(error, mass):
+    recording = run(Scenario(1.0, model_error=error))
+    assert recording.attrs["end_kind"] == "completed"
+    assert recording.attrs["mass"] == pytest.approx(mass, rel=1e-6)
+    total = float(recording["wrench"].isel(time=-1).sel(component="fz").sum())
+    assert total == pytest.approx(mass * 9.81, rel=5e-3)
+    # The controller, which does not know, lets the CoM sink.
+    assert float(recording["com"].isel(time=-1)[2] - recording["com"].isel(time=0)[2]) < -3e-4
+
+
+def test_slippery_ground_lets_a_foot_slip_and_only_from_then_on():
+    push = (Push((60.0, 0.0, 0.0), 0.6, 0.3),)
+    rough = run(Scenario(1.2, pushes=push))
+    smooth = run(Scenario(1.2, pushes=push, friction=(FrictionChange(0.01, 0.5),)))
+    assert smooth.attrs["tip_kind"] == "slip"
+    assert smooth.attrs["tip_time"] > 0.6
+    assert rough.attrs["tip_kind"] != "slip"
+    before = {"time": slice(0, 0.49)}
+    assert smooth["com"].sel(before).equals(rough["com"].sel(before))
+    # A rollout leaves the engine's ground as it was.
+    assert run(Scenario(1.2, pushes=push)).equals(rough)
+
+
+def test_friction_may_change_under_one_contact():
+    push = (Push((60.0, 0.0, 0.0), 0.2, 0.3),)
+    found = run(Scenario(0.8, pushes=push, friction=(FrictionChange(0.0, 0.1, "r_sole"),)))
+    assert found.attrs["tip_contact"] == "r_sole"
+
+
+def test_odometry_finds_the_base_of_a_robot_whose_foot_stands():
+    stance, random = icub(), np.random.default_rng(0)
+    for foot in ("l_sole", "r_sole", "loaded"):
+        odometry = FootOdometry(stance, foot)
+        for _ in range(5):
+            motion = stance.admissible_motions @ random.uniform(-0.3, 0.3, 17)
+            moved = copsense.retract(stance, 0.2 * motion)
+            speed = moved.admissible_motions @ random.uniform(-1, 1, 17)
+            hidden = moved.q.copy()
+            hidden[:7] = [9.0, 9.0, 9.0, 0.0, 0.0, 0.0, 1.0]
+            wrenches = random.uniform(0, 100, (2, 6))
+            q, v = odometry.estimate(hidden, speed, wrenches)
+            turn = abs(q[3:7] @ moved.q[3:7])
+            np.testing.assert_allclose(q[:3], moved.q[:3], atol=1e-9)
+            assert turn == pytest.approx(1.0, abs=1e-12)
+            np.testing.assert_allclose(v, speed, atol=1e-9)
+
+
+@pytest.mark.parametrize("foot", ["l_sole", "loaded"])
+def test_a_robot_stands_on_odometry_with_soft_gains(foot):
+    recording = run(Scenario(0.5, odometry=foot), gains=public_gains(icub().robot))
+    assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
+    assert np.abs(recording["com"] - recording["com"][0]).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        Scenario(0.2, noise=Noise(1e-4, 1e-2, 1.0, 0.1), seed=5),
+        Scenario(0.2, odometry="loaded", noise=Noise(1e-4), seed=5),
+        Scenario(0.2, friction=(FrictionChange(0.1, 0.05),), model_error=ModelError(0.02)),
+        Scenario(0.2, motors=Motors(0.005, 40.0, 20.0), pushes=(Push((0.0, 20.0, 0.0), 0.05),)),
+    ],
+    ids=["noise", "odometry", "ground and mass", "motors and push"],
+)
+def test_the_same_seed_gives_the_same_numbers(scenario):
+    first, again = run(scenario), run(scenario)
+    assert first.equals(again)
+
+
+def test_what_does_not_fit_is_refused():
+    with pytest.raises(UnknownNameError, match="l_sole"):
+        run(Scenario(0.1, friction=(FrictionChange(0.1, 0.0, "left"),)))
+    with pytest.raises(UnknownNameError, match="loaded"):
+        run(Scenario(0.1, odometry="left"))
+    with pytest.raises(InvalidInputError, match="point contact says nothing"):
+        FootOdometry(copsense.load_stance("solo12"), "loaded")
+    with pytest.raises(UnknownNameError, match="payload"):
+        run(Scenario(0.1, model_error=ModelError(payload={"hand": 1.0})))
+    for build in (
+        lambda: ModelError(mass=-1.0),
+        lambda: ModelError(payload={"l_hand": 0.0}),
+        lambda: FrictionChange(-0.1),
+        lambda: FrictionChange(0.1, -1.0),
+        lambda: Noise(force=-1.0),
+    ):
+        with pytest.raises(InvalidInputError):
+            build()
+    statue = Statue(icub())
+    controller = BalancingController(icub(), C2)
+    for scenario in (
+        Scenario(0.1, model_error=ModelError(0.1)),
+        Scenario(0.1, friction=(FrictionChange(0.1),)),
+    ):
+        with pytest.raises(InvalidInputError, match="Statue cannot simulate"):
+            rollout(statue, controller, scenario)
+
+
+OWN = """
+import numpy as np
+
+class Limp:
+    def __init__(self, stance):
+        self.n = len(stance.robot.torque_names)
+
+    def __call__(self, observation):
+        return np.zeros(self.n)
+
+def limp(observation):
+    return np.zeros(23)
+
+def made(stance):
+    return Limp(stance)
+
+def broken(stance):
+    raise RuntimeError("no batteries")
+
+number = 3.0
+"""
+
+
+@pytest.fixture
+def own_module(tmp_path, monkeypatch):
+    (tmp_path / "own_module_of_a_test.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    return "own_module_of_a_test"
+
+
+def test_a_users_controller_is_one_class_or_one_function(own_module):
+    ends = []
+    for name in ("Limp", "limp", "made"):
+        controller = load_controller(f"{own_module}:{name}", icub())
+        recording = rollout(simulator(), controller, Scenario(1.0), until="fall")
+        ends.append((recording.attrs["end_kind"], recording.attrs["end_time"]))
+    assert len(set(ends)) == 1
+    assert ends[0][0] == "fall"
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "says"),
+    [
+        ("Limpp", UnknownNameError, "Did you mean Limp"),
+        ("number", InvalidInputError, "no controller"),
+        ("broken", ControllerError, "no batteries"),
+    ],
+)
+def test_a_users_controller_that_is_none_is_one_error(own_module, name, error, says):
+    with pytest.raises(error, match=says):
+        load_controller(f"{own_module}:{name}", icub())
+    with pytest.raises(InvalidInputError, match="MODULE:ATTRIBUTE"):
+        load_controller(own_module, icub())
+    with pytest.raises(InvalidInputError, match="cannot be imported"):
+        load_controller("no_such_module_anywhere:f", icub())
