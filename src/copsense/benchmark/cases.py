@@ -96,7 +96,7 @@ class RobotChoice:
             for frame, (x0, x1, y0, y1) in self.soles.items():
                 own = next((c for c in known if c.frame == frame), Contact(frame))
                 x, y, z = (float(c) * self.sole_height for c in own.rotation[:, 2])
-                sole = rectangle((x0, x1), (y0, y1))
+                sole = rectangle((float(x0), float(x1)), (float(y0), float(y1)))
                 contacts.append(replace(own, polygon=sole, offset=(x, y, z)))
         return load_stance(
             robot, contacts=contacts, posture=posture.angles(self.source), width=posture.width

@@ -116,7 +116,11 @@ def statics(
             normals, offsets = half_planes(contact.polygon)
             edges.append(offsets - normals @ here.cop[k])
             rates.append(-normals @ slopes[k])
-    distance, rate = np.concatenate(edges), np.concatenate(rates)
+    # The path's posture nearest to the start is a little off it.
+    off = float(values[start])
+    rate = np.concatenate(rates)
+    distance = np.concatenate(edges) - off * rate
+    torque_slope = here.torque_derivative @ (here.basis.T @ tangent)
     outwards = rate * (1.0 if high >= -low else -1.0)
     closing = outwards < -1e-12
     travel = (distance[closing] / -outwards[closing]).min() if closing.any() else np.inf
@@ -129,8 +133,8 @@ def statics(
         float(travel),
         distance,
         rate,
-        here.equilibrium.torques,
-        here.torque_derivative @ (here.basis.T @ tangent),
+        here.equilibrium.torques - off * torque_slope,
+        torque_slope,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import Any, Literal
@@ -207,7 +208,7 @@ def _rest(trial: Rest, bench: Bench) -> list[Score]:
 def _falls(trial: Falls, bench: Bench) -> list[Score]:
     reference, mass = bench.reference(Hold()), bench.stance.robot.mass
     noise = Noise(trial.position_noise, trial.velocity_noise)
-    fell = tipped = 0
+    ends: Counter[str] = Counter()
     for repeat in range(trial.repeats):
         draw = np.random.default_rng([trial.seed, repeat])
         start, side = _START + 0.5 * draw.random(), draw.choice([-1.0, 1.0])
@@ -221,10 +222,12 @@ def _falls(trial: Falls, bench: Bench) -> list[Score]:
             noise=noise,
             seed=int(draw.integers(2**31)),
         )
-        fell += run.attrs["end_kind"] != "completed"
-        tipped += bool(run.attrs["tip_contact"])
+        ends[str(run.attrs["end_kind"])] += 1
+    fell = trial.repeats - ends.pop("completed", 0)
     low, high = wilson_interval(fell, trial.repeats)
-    reason = f"{fell} of {trial.repeats} fell, in {tipped} a contact tipped"
+    # Which has no feet on the ground any more diverges, mostly before its CoM is down.
+    kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(ends.items()))
+    reason = f"{fell} of {trial.repeats} fell" + (f": {kinds}" if fell else "")
     return [
         Score(
             "fall_rate", "measured", fell / trial.repeats, low, high,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -48,8 +48,6 @@ SCORES = {
 }
 """What each score is."""
 
-Side = Literal["left", "right"]
-
 
 def _check_side(side: str) -> None:
     if side not in ("left", "right"):
@@ -63,12 +61,12 @@ class Lean:
     Attributes:
         reach: how far to lean [m]; None until the CoM is over the foot, or as far as it gets.
         speed: of the CoM [m/s].
-        side: where to.
+        side: ``"left"`` or ``"right"``.
     """
 
     reach: float | None = None
     speed: float = 5e-3
-    side: Side = "left"
+    side: str = "left"
 
     kind: ClassVar[str] = "lean"
     scores: ClassVar[tuple[str, ...]] = ("tip_excursion",)
@@ -94,13 +92,13 @@ class PushToTip:
         resolution: bisect until the two ends are within twice this [N s].
         largest: impulse to try first [N s]; None for what gives the CoM 0.5 m/s.
         duration: of each push [s].
-        side: where to.
+        side: ``"left"`` or ``"right"``.
     """
 
     resolution: float = 0.05
     largest: float | None = None
     duration: float = 0.05
-    side: Side = "left"
+    side: str = "left"
 
     kind: ClassVar[str] = "push"
     scores: ClassVar[tuple[str, ...]] = ("tip_impulse",)
@@ -195,7 +193,7 @@ class Falls:
         seed: of everything random.
     """
 
-    velocity: float = 0.2
+    velocity: float = 0.14
     repeats: int = 20
     duration: float = 0.05
     position_noise: float = 1e-4
@@ -247,7 +245,7 @@ class Breaking:
         frequency: of the sway [Hz]; it lasts one period.
     """
 
-    parameter: Literal["delay", "bandwidth", "velocity_noise", "torque_limit"] = "delay"
+    parameter: str = "delay"
     mild: float | None = None
     severe: float | None = None
     step: float | None = None
