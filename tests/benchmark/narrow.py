@@ -24,10 +24,10 @@ FULL = RobotChoice(
 )
 STRAIGHT = PostureChoice("straight", knees=0.0)
 C1, C2 = ControllerChoice("minimum-wrench"), ControllerChoice("minimum-torque")
-LEAN = Lean(0.015, 0.02)
+LEAN, REST = Lean(0.015, 0.02), Rest(0.1)
 
 
-def plan(trials=(LEAN, Rest(0.1)), controllers=(C1, C2)):
+def plan(trials=(LEAN, REST), controllers=(C1, C2)):
     """Two controllers, two trials: four cases."""
     return make_plan([ROBOT], [STRAIGHT], controllers, trials)
 

@@ -68,7 +68,8 @@ def bisect(survives: Callable[[float], bool], mild: float, severe: float, step: 
     count = max(1, math.ceil(abs(severe - mild) / step - 1e-9))
 
     def value(k: int) -> float:
-        return severe if k == count else mild + direction * k * step
+        # Rounded, so that 0.3 is tried and not 0.30000000000000004.
+        return severe if k == count else round(mild + direction * k * step, 12)
 
     runs = 1
     if survives(value(count)):

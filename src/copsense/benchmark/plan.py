@@ -133,8 +133,6 @@ def _block(
 
 def _robot(name: str, table: dict[str, Any]) -> RobotChoice:
     table.setdefault("source", name)
-    if "contacts" in table:
-        table["contacts"] = tuple(table["contacts"])
     if "soles" in table:
         table["soles"] = {frame: tuple(sole) for frame, sole in table["soles"].items()}
     return build(RobotChoice, table | {"name": name})
@@ -190,4 +188,5 @@ def build(cls: type[C], values: Mapping[str, Any]) -> C:
     for name in values:
         if name not in known:
             raise UnknownNameError(f"field of {cls.__name__}", name, known)
-    return cls(**values)
+    # TOML has lists where values have tuples.
+    return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})

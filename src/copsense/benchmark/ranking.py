@@ -30,8 +30,8 @@ def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
     """The controllers' ranks in each setting (robot, posture, conditions, trial) and score.
 
     A controller's rank is 1 plus the number of those clearly better: whose interval lies wholly
-    beyond its own. Within their resolution controllers share a rank. A failed run is after all
-    that did not fail.
+    beyond its own. Within their resolution controllers share a rank. A run that failed
+    or tipped too early comes last.
 
     Returns:
         The rows of the table with ``rank`` and ``of``, the number of controllers in the setting.
@@ -40,7 +40,7 @@ def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
     ranked["rank"], ranked["of"] = 1, 1
     for (*_, score), rows in table.groupby(_SETTING, sort=False):
         larger = SCORES[str(score)].larger
-        failed = (rows["status"] == "failed").to_numpy()
+        failed = rows["status"].isin(["failed", "tipped"]).to_numpy()
         # Better is larger from here on.
         low = (rows["low"] if larger else -rows["high"]).to_numpy()
         high = (rows["high"] if larger else -rows["low"]).to_numpy()
@@ -76,7 +76,7 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
                     "mean_rank": float(own["rank"].mean()),
                     "wins": int((own["rank"] == 1).sum()),
                     "settings": len(own),
-                    "failures": int((own["status"] == "failed").sum()),
+                    "failures": int(own["status"].isin(["failed", "tipped"]).sum()),
                     "mean": float(own["value"].mean()) if measured else np.nan,
                 }
             )

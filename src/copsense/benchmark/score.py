@@ -24,7 +24,7 @@ _AFTER = 1.0  # s to watch after a push
 _SETTLED = 1.0, 0.2  # s, or share of a run: how much of its beginning is not scored
 _FASTEST = 0.5  # m/s of the CoM: a push that gives it more tips everything
 
-Status = Literal["measured", "bound", "failed"]
+Status = Literal["measured", "bound", "tipped", "failed"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Score:
     Attributes:
         score: its name, one of `SCORES`.
         status: ``"measured"``; ``"bound"`` where only the interval is known, as when nothing
-            tipped; ``"failed"``.
+            tipped; ``"tipped"`` where a contact tipped before it could be measured; ``"failed"``.
         value: in the score's unit, NaN unless measured.
         low: lower end of what the value may be: resolution, bracket, or 95 % interval of a rate.
         high: upper end.
@@ -141,16 +141,12 @@ def _sway(trial: Sway, bench: Bench) -> list[Score]:
                 on_path, first_order = getattr(expected, name)(y)
                 rows[name] = replace(rows[name], predicted=on_path, first_order=first_order)
     elif contact := str(run.attrs["tip_contact"]):  # a CoP reached the edge
-        margin = replace(margin, status="bound", low=-math.inf, high=0.0, contact=contact)
+        rows = {name: replace(row, status="tipped", contact=contact) for name, row in rows.items()}
+        margin = replace(rows["smallest_margin"], status="bound", low=-math.inf, high=0.0)
     if expected is not None:
         size = abs(trial.amplitude)
         on_path, first_order = expected.smallest_margin(-size, size)
-        margin = replace(
-            margin,
-            predicted=_known(on_path),
-            first_order=_known(first_order),
-            predicted_contact=expected.contact,
-        )
+        margin = replace(margin, predicted=_known(on_path), first_order=_known(first_order))
     return [margin, *(rows[name] for name in trial.scores[1:])]
 
 

@@ -152,9 +152,10 @@ def _check_alone(robots: tuple[str, ...], options: dict[str, Any]) -> None:
     """Refuse options that a plan file decides."""
     context = click.get_current_context()
     given = [
-        f"--{name.replace('_', '-')}"
-        for name in options
-        if str(context.get_parameter_source(name)).endswith("COMMANDLINE")
+        option.opts[0]
+        for option in context.command.params
+        if option.name in options
+        and getattr(context.get_parameter_source(option.name), "name", "") == "COMMANDLINE"
     ]
     if robots or given:
         raise InvalidInputError(
@@ -336,8 +337,8 @@ def _shown(unit: str) -> tuple[str, float]:
 
 def _value(row: Any, factor: float) -> str:
     low, high = row.low * factor, row.high * factor
-    if row.status == "failed":
-        return f"failed: {row.reason}"
+    if row.status in ("failed", "tipped"):
+        return f"{'failed' if row.status == 'failed' else 'not measured'}: {row.reason}"
     if row.status == "bound":
         text = f"at least {low:.4g}" if math.isfinite(low) else f"at most {high:.4g}"
         text += f" ({row.reason})"

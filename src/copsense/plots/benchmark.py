@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from copsense.benchmark import agreement
+from copsense.benchmark import CAVEAT, agreement
 from copsense.plots.style import INK, MUTED, colours, new_figure, styled
 
 _ACROSS = 3  # panels in a row
@@ -52,7 +52,9 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
             Line2D([], [], label="to first order", markerfacecolor="none", **dot),  # type: ignore[arg-type]
         ]
     handles.append(Line2D([], [], label="prediction", color=INK, linestyle="", marker="|"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
+    legend = figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=9)
+    if compared:
+        legend.set_title(CAVEAT, {"size": 8})
     cases, robots = table["key"].nunique(), ", ".join(dict.fromkeys(table["robot"]))
     figure.suptitle(
         f"{robots}: {cases} case{'s' * (cases != 1)} in closed loop beside the statics",
@@ -141,7 +143,7 @@ def _draw_bars(
                 ax.barh(at, end, 0.9 * step, color=colour[name], alpha=0.45, hatch="//")
                 _note(ax, max(end, 0.0), at, f" {word} {end:.3g}")
             else:
-                _note(ax, 0.0, at, " × failed")
+                _note(ax, 0.0, at, f" × {row['status']}")
             if math.isfinite(row["predicted"]):
                 expected = float(row["predicted"]) * factor
                 ax.plot([expected] * 2, [at - step / 2, at + step / 2], color=INK, linewidth=1.3)
