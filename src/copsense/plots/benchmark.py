@@ -52,9 +52,14 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
             Line2D([], [], label="to first order", markerfacecolor="none", **dot),  # type: ignore[arg-type]
         ]
     handles.append(Line2D([], [], label="prediction", color=INK, linestyle="", marker="|"))
-    legend = figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=9)
-    if compared:
-        legend.set_title(CAVEAT, {"size": 8})
+    figure.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=5,
+        fontsize=9,
+        title=CAVEAT if compared else None,
+        title_fontsize=8,
+    )
     cases, robots = table["key"].nunique(), ", ".join(dict.fromkeys(table["robot"]))
     figure.suptitle(
         f"{robots}: {cases} case{'s' * (cases != 1)} in closed loop beside the statics",
