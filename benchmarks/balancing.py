@@ -1,6 +1,6 @@
-"""Section V in closed loop, and where feet tip: writes benchmarks/balancing.csv, .md and .png.
+"""Section V in closed loop, and where feet tip: writes benchmarks/balancing.csv and .md.
 
-    python benchmarks/balancing.py [--force] [--jobs N]
+    python benchmarks/balancing.py [--force] [--jobs N] [--plot FILE]
 
 Runs the plan balancing.toml (about ten minutes on two cores), of which only what the table lacks;
 --force starts it anew. The page says whether each requirement holds, and the exit code 1 if not.
@@ -325,6 +325,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--force", action="store_true", help="run everything anew")
     parser.add_argument("--jobs", type=int, default=min(os.cpu_count() or 1, 8))
+    parser.add_argument("--plot", metavar="FILE", help="draw the table, too: .png, .svg or .pdf")
     options = parser.parse_args()
     shape = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"
     with tqdm(total=1.0, desc="balancing", bar_format=shape, disable=None) as bar:
@@ -335,7 +336,8 @@ def main() -> int:
             overwrite=options.force,
             progress=lambda share: bar.update(min(share, 1.0 - bar.n)),
         )
-    save_figure(plot_benchmark(table), HERE.with_suffix(".png"), overwrite=True, dpi=80)
+    if options.plot:
+        save_figure(plot_benchmark(table), options.plot, overwrite=True)
     text = [
         "# Balancing in closed loop",
         "",

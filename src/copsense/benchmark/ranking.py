@@ -57,9 +57,9 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
     Only settings in which every controller of the trial was tried count, where there is one.
 
     Returns:
-        A row per trial, score and controller, the best first: ``mean_rank``, ``wins`` (settings
-        in which none is better), ``settings``, ``failures``, and ``mean`` of the values measured
-        (NaN where one was not).
+        A row for each trial, score and controller, the best first, with ``mean_rank``, ``wins``
+        (settings in which none is better), ``settings``, ``failures`` (failed or tipped), and
+        ``mean`` of the values (NaN where one was not measured).
     """
     ranked, rows = rank_scores(table), []
     for (trial, score), group in ranked.groupby(["trial", "score"], sort=False):

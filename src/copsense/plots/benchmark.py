@@ -41,7 +41,9 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
         _draw_agreement(ax, table, found, score, colour)
     for i, ((trial, score), rows) in enumerate(groups):
         ax = figure.add_subplot(grid[top + i // _ACROSS, i % _ACROSS])
-        _draw_bars(ax, str(trial), str(score), rows, colour)
+        row = range(i - i % _ACROSS, min(i - i % _ACROSS + _ACROSS, len(groups)))
+        settings = max(_settings(groups[j][1]) for j in row)
+        _draw_bars(ax, str(trial), str(score), rows, colour, settings)
     handles: list[Line2D | Patch] = [
         Patch(color=shade, label=name) for name, shade in colour.items()
     ]
@@ -73,8 +75,11 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
 
 
 def _height(rows: pd.DataFrame, colour: dict[str, str]) -> float:
-    settings = len(rows.groupby(_SETTING))
-    return 1.05 + _BAR * settings * (len(colour) + 0.8)
+    return 1.05 + _BAR * _settings(rows) * (min(len(colour), 4) + 0.8)
+
+
+def _settings(rows: pd.DataFrame) -> int:
+    return len(rows.groupby(_SETTING))
 
 
 def _draw_agreement(
@@ -118,7 +123,7 @@ def _draw_agreement(
 
 
 def _draw_bars(
-    ax: Axes, trial: str, score: str, rows: pd.DataFrame, colour: dict[str, str]
+    ax: Axes, trial: str, score: str, rows: pd.DataFrame, colour: dict[str, str], room: int
 ) -> None:
     """A bar per controller in each setting, its interval as a whisker, the prediction as a tick."""
     unit, factor = _shown(rows["unit"].iloc[0])
@@ -156,7 +161,7 @@ def _draw_bars(
         range(len(settings)),
         [", ".join((r, p, c) if several else (r, p)) for r, p, c in settings],
     )
-    ax.set_ylim(len(settings) - 0.5, -0.5)
+    ax.set_ylim(room - 0.5, -0.5)  # panels side by side have bars alike
     least = float(known.min(initial=0.0))
     ax.set_xlim(min(0.0, 1.08 * least), 1.12 * longest)
     ax.grid(visible=False, axis="y")
