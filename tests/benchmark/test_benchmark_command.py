@@ -80,7 +80,7 @@ def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):
     assert "holds the theory against physics" in answer.out
     assert picture.stat().st_size > 10_000
     assert len(load_benchmark(table)) == 1
-    again = copsense("benchmark", "--plan", plan, "--output", table, "--json")
+    again = copsense("benchmark", "--plan", plan, "--output", table, "--plot", picture, "--json")
     assert "1 of 1 cases are in" in again.err
     found = again.json
     assert found["cases"] == 1

@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -103,8 +104,10 @@ def benchmark(
 
     if importlib.util.find_spec("mujoco") is None:
         raise MissingExtraError("mujoco", "sim", "a benchmark in closed loop")
+    # A table that is gone on with has its picture drawn anew.
+    redraw = force or (output is not None and Path(output).exists())
     if picture is not None:
-        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=redraw)
     if plan_file is None:
         plan = _plan(robots or ("icub",), **options)
     else:
@@ -132,7 +135,7 @@ def benchmark(
     if picture is not None:
         from copsense.plots import plot_benchmark, save_figure
 
-        save_figure(plot_benchmark(table), picture, overwrite=force)
+        save_figure(plot_benchmark(table), picture, overwrite=redraw)
     if as_json:
         echo_json(_summary(plan, table))
     else:
