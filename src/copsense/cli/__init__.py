@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from copsense._version import __version__
 from copsense.cli.analyse import analyse
 from copsense.cli.balance import balance
+from copsense.cli.benchmark import benchmark
 from copsense.cli.design import design
 from copsense.cli.four_bar import four_bar
 from copsense.cli.reproduce import reproduce
@@ -36,7 +37,7 @@ def copsense() -> None:
     """
 
 
-for _command in (robots, four_bar, analyse, sweep, plot, design, balance, reproduce):
+for _command in (robots, four_bar, analyse, sweep, plot, design, balance, benchmark, reproduce):
     copsense.add_command(_command)
 
 

@@ -6,6 +6,7 @@ Figure where they need several. No window is opened and no figure is kept in a g
 
 from __future__ import annotations
 
+from copsense.plots.benchmark import plot_benchmark
 from copsense.plots.cops import plot_cop, plot_foot_cop
 from copsense.plots.curves import (
     plot_load,
@@ -36,6 +37,7 @@ from copsense.plots.sway import (
 )
 
 __all__ = [
+    "plot_benchmark",
     "plot_cop",
     "plot_criteria_curves",
     "plot_design",

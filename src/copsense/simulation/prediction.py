@@ -84,12 +84,13 @@ def predict(
     side = 1.0 if high >= -low else -1.0
     middle = int(np.argmin(np.abs(values)))
     order = np.arange(middle, len(values)) if side > 0 else np.arange(middle, -1, -1)
-    travel = np.abs(values[order] - values[middle])
+    travel = side * values[order]  # the path's postures need not include the very start
     excursion, contact, first_order = np.inf, "", np.inf
     for k, distances in enumerate(margins):
         for edge in distances[order].T:
             if len(travel) > 1 and edge[1] < edge[0]:
-                first_order = min(first_order, edge[0] / (edge[0] - edge[1]) * travel[1])
+                part = edge[0] / (edge[0] - edge[1])
+                first_order = min(first_order, travel[0] + part * (travel[1] - travel[0]))
             beyond = np.flatnonzero(edge <= 0)
             if len(beyond):
                 i = int(beyond[0])

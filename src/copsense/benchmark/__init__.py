@@ -1,0 +1,58 @@
+"""Benchmark: how far a controller leans, or is pushed, before a foot tips, beside the prediction.
+
+A plan is a set of cases: robot, posture, controller, conditions and trial, each a value. A case
+gives scores, a score is a row of one table, and a run that fails is a row with its reason. The
+prediction uses the law that the controller applies: it tells theory from physics, and ranks
+controllers by what physics says. Falls are scored with limits only, as a rate over perturbed
+repeats: without limits they follow chance more than the criterion.
+"""
+
+from copsense.benchmark.cases import Case, Conditions, ControllerChoice, PostureChoice, RobotChoice
+from copsense.benchmark.intervals import fisher_interval, wilson_interval
+from copsense.benchmark.plan import make_plan, read_plan
+from copsense.benchmark.prediction import predict_impulse
+from copsense.benchmark.ranking import CAVEAT, agreement, rank_controllers, rank_scores
+from copsense.benchmark.run import run_benchmark, run_case
+from copsense.benchmark.score import Score
+from copsense.benchmark.table import load_benchmark
+from copsense.benchmark.trials import (
+    SCORES,
+    Breaking,
+    Falls,
+    Lean,
+    PushToTip,
+    Rest,
+    ScoreKind,
+    Sway,
+    Trial,
+)
+
+__all__ = [
+    "CAVEAT",
+    "SCORES",
+    "Breaking",
+    "Case",
+    "Conditions",
+    "ControllerChoice",
+    "Falls",
+    "Lean",
+    "PostureChoice",
+    "PushToTip",
+    "Rest",
+    "RobotChoice",
+    "Score",
+    "ScoreKind",
+    "Sway",
+    "Trial",
+    "agreement",
+    "fisher_interval",
+    "load_benchmark",
+    "make_plan",
+    "predict_impulse",
+    "rank_controllers",
+    "rank_scores",
+    "read_plan",
+    "run_benchmark",
+    "run_case",
+    "wilson_interval",
+]
