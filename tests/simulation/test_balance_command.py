@@ -1,5 +1,6 @@
 """``copsense balance`` answers, writes and refuses."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -7,8 +8,6 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from copsense.errors import CopsenseError
-from copsense.simulation.video import check_video
 from copsense.storage import load_recording
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
@@ -81,14 +80,14 @@ def test_disturbances_from_the_command():
 
 
 def test_a_run_is_filmed(tmp_path):
-    try:
-        check_video()
-    except CopsenseError as error:
-        pytest.skip(str(error))
     film = tmp_path / "run.mp4"
-    answer = copsense("balance", "icub", "--duration", 0.3, "--video", film)
-    assert answer.code == 0, answer.err
-    assert b"ftyp" in film.read_bytes()[:16]
+    # A process of its own: how MuJoCo draws is settled when it is first imported.
+    code = "from copsense.cli import main; main()"
+    command = [sys.executable, "-c", code, "balance", "icub", "--duration", "0.3", "--video", film]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if "cannot draw off-screen" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
     reader = imageio_ffmpeg.read_frames(str(film))
     size = next(reader)["size"]
     frames = [np.frombuffer(frame, dtype=np.uint8).reshape(*size[::-1], 3) for frame in reader]

@@ -210,7 +210,7 @@ def test_a_users_controller_is_one_class_or_one_function(own_module):
 @pytest.mark.parametrize(
     ("name", "error", "says"),
     [
-        ("Limpp", UnknownNameError, "Did you mean Limp"),
+        ("Limpp", UnknownNameError, "Did you mean limp"),
         ("number", InvalidInputError, "no controller"),
         ("broken", ControllerError, "no batteries"),
     ],

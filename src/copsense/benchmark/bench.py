@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Callable
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 import xarray as xr
 
 from copsense.benchmark.cases import Case
@@ -22,11 +18,10 @@ from copsense.controllers import (
     Ramp,
     Signal,
     lateral_reference,
+    load_controller,
 )
 from copsense.errors import (
     CopsenseError,
-    InvalidInputError,
-    UnknownNameError,
     UnreachablePostureError,
 )
 from copsense.simulation import MujocoSimulator, Push, Scenario, rollout
@@ -63,7 +58,7 @@ class Bench:
         """What balances the robot."""
         choice = self.case.controller
         if choice.source:
-            return _own_controller(choice.source, self.stance)
+            return load_controller(choice.source, self.stance)
         return BalancingController(
             self.stance, self.criterion, self.gains, limits=self.limits, name=choice.name
         )
@@ -135,29 +130,3 @@ class Bench:
                 if model.names[i] in names:
                     found[model.names[i]] = None
         return tuple(found)
-
-
-def _own_controller(source: str, stance: Stance) -> Controller:
-    """A user's controller, from ``MODULE:ATTRIBUTE`` called with the stance."""
-    module_name, _, attribute = source.partition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise InvalidInputError(
-            f"the controller's module {module_name!r} cannot be imported: {error}. Run the command "
-            "in its folder, or install it."
-        ) from error
-    make = getattr(module, attribute, None)
-    if make is None:
-        public = [name for name in vars(module) if not name.startswith("_")]
-        raise UnknownNameError(f"controller in {module_name!r}", attribute, public)
-    made = make(stance)
-    if not callable(made) or isinstance(made, np.ndarray):
-        raise InvalidInputError(
-            f"{source} of the stance is {made!r}, no controller. Return a callable observation -> "
-            "torques."
-        )
-    return made

@@ -7,6 +7,9 @@ bias forces and centre of mass of both engines are compared.
 
 from __future__ import annotations
 
+import os
+import sys
+from ctypes.util import find_library
 from typing import Any
 
 import numpy as np
@@ -273,6 +276,10 @@ def _quiet(message: str) -> None:
 
 def load_mujoco() -> Any:
     """The engine's package, an extra."""
+    # How it will draw off-screen is settled when it is first imported.
+    screen = {"DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"} & set(os.environ)
+    if sys.platform == "linux" and not screen and find_library("EGL"):
+        os.environ["MUJOCO_GL"] = "egl"
     try:
         import mujoco
     except ImportError:

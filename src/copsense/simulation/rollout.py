@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 import xarray as xr
+from threadpoolctl import threadpool_limits
 
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, lateral_reference
@@ -64,6 +65,28 @@ def rollout(
     """
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
+    # The matrices of a step are small: more BLAS threads than one make it many times slower.
+    with threadpool_limits(limits=1, user_api="blas"):
+        return _run(
+            simulator,
+            controller,
+            scenario,
+            until,
+            record_period,
+            thresholds or Thresholds(),
+            progress,
+        )
+
+
+def _run(
+    simulator: Simulator,
+    controller: Controller,
+    scenario: Scenario,
+    until: Literal["tip", "fall"],
+    record_period: float,
+    thresholds: Thresholds,
+    progress: Callable[[int], object] | None,
+) -> xr.Dataset:
     believed, dt = simulator.stance, simulator.time_step
     name, n = controller_name(controller), len(believed.robot.torque_names)
     scenario.check_stance(believed)
@@ -80,7 +103,7 @@ def rollout(
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
     sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance)
-    watch, recorder = Watch(stance, thresholds or Thresholds()), Recorder(stance)
+    watch, recorder = Watch(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
     if count < 1:

@@ -17,6 +17,7 @@ import pinocchio as pin
 import xarray as xr
 
 from copsense.errors import InvalidInputError, MissingExtraError, OutputError
+from copsense.simulation.engine import load_mujoco
 from copsense.stance import Stance
 from copsense.storage import check_output, write_beside
 
@@ -100,18 +101,9 @@ def _encoder() -> Any:
     return imageio_ffmpeg.write_frames
 
 
-def _mujoco() -> Any:
-    # Off-screen drawing is chosen when MuJoCo is first imported.
-    if "DISPLAY" not in os.environ:
-        os.environ.setdefault("MUJOCO_GL", "egl")
-    from copsense.simulation.engine import load_mujoco
-
-    return load_mujoco()
-
-
 def _scene() -> Any:
     """A world with light and ground; the robot is drawn into it frame by frame."""
-    mujoco = _mujoco()
+    mujoco = load_mujoco()
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = (
         _WIDE,
@@ -138,7 +130,7 @@ def _scene() -> Any:
 
 @contextmanager
 def _renderer(model: Any) -> Iterator[Any]:
-    mujoco = _mujoco()
+    mujoco = load_mujoco()
     try:
         renderer = mujoco.Renderer(model, _HIGH, _WIDE)
     except Exception as error:
@@ -146,7 +138,7 @@ def _renderer(model: Any) -> Iterator[Any]:
             "this machine cannot draw off-screen "
             f"({type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'no GL'}; "
             f"MUJOCO_GL={os.environ.get('MUJOCO_GL', 'unset')}). Install EGL (libegl1, "
-            "libgl1-mesa-dri) and set MUJOCO_GL=egl, or leave the video out."
+            "libgl1-mesa-dri) and set MUJOCO_GL=egl before Python starts, or leave the video out."
         ) from None
     try:
         yield renderer
@@ -156,7 +148,7 @@ def _renderer(model: Any) -> Iterator[Any]:
 
 @contextmanager
 def _screen(stance: Stance) -> Iterator[Callable[[xr.Dataset, int], np.ndarray]]:
-    mujoco, model = _mujoco(), stance.robot.model
+    mujoco, model = load_mujoco(), stance.robot.model
     scene_model, data = _scene(), model.createData()
     scene_data = mujoco.MjData(scene_model)
     mujoco.mj_forward(scene_model, scene_data)
