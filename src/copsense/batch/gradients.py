@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from copsense.batch.choice import WEIGHTED, Choices
 from copsense.batch.kinematics import screw_cross
 from copsense.batch.lanes import (
     add3,
@@ -35,7 +36,7 @@ from copsense.batch.lanes import (
 from copsense.batch.layout import PRISMATIC, Feet, Tree
 from copsense.batch.loops import expand, gather_groups, solve_lower, solve_upper
 from copsense.batch.rows import Rows
-from copsense.batch.sharing import WEIGHTED, Choices, across_symmetric
+from copsense.batch.sharing import across_symmetric
 from copsense.batch.tangents import project, store_base_and_joints
 
 

@@ -6,15 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from copsense.batch.choice import LEAST_WRENCH, Choices
+from copsense.batch.gains import com_gains, com_motions, margins
 from copsense.batch.gradients import torque_gradients, wrench_gradients
+from copsense.batch.inertia import factorise_inertia
 from copsense.batch.kinematics import move, place_feet
 from copsense.batch.lanes import along, compiled, get, load, load3, put, store, store3
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.loops import build
 from copsense.batch.rows import Rows
 from copsense.batch.sharing import (
-    LEAST_WRENCH,
-    Choices,
     finish,
     least_squares,
     least_wrench,
@@ -30,6 +31,10 @@ class Out(NamedTuple):
     torques: np.ndarray
     cops: np.ndarray
     gradient: np.ndarray
+    com_gain: np.ndarray
+    com_travel: np.ndarray
+    margin: np.ndarray
+    load_share: np.ndarray
     com: np.ndarray
     doubtful: np.ndarray
 
@@ -50,6 +55,7 @@ def run(
     """Fill the results of postures start to stop, `width` abreast."""
     nc, nv = len(feet.body), len(tree.parent) + 5
     moving = feet.held == 1
+    gains = len(out.com_gain) > 0
     for first in range(start, stop, width):
         count = min(width, stop - first)
         for lane in range(width):
@@ -64,6 +70,9 @@ def run(
         if moving:
             span(feet, rows, W)
             level_gradients(tree, feet, rows, W)
+        if gains and moving:
+            factorise_inertia(tree, rows, W)
+            com_motions(tree, feet, rows, W)
         for index in range(len(choices.kind)):
             store(W, rows.doubt, load(W, rows.flag))
             if choices.kind[index] == LEAST_WRENCH:
@@ -75,17 +84,28 @@ def run(
                 least_squares(feet, rows, W, choices, index)
                 finish(tree, feet, rows, W)
                 torque_gradients(tree, feet, rows, W, choices, index)
+            if gains:
+                com_gains(tree, feet, rows, W)
+            margins(feet, rows, W, gains)
             for output in range(2 * nc):
                 at = rows.gradient + nv * output
                 store3(W, at, along(W, rows.rotation, load3(W, at)))
                 store3(W, at + 3, along(W, rows.rotation, load3(W, at + 3)))
+            column = choices.column[index]
             for lane in range(count):
                 row = first + lane
-                _copy(W, rows.contact_wrench, lane, out.wrenches[row, index])
-                _copy(W, rows.torque + 1, lane, out.torques[row, index])
-                _copy(W, rows.cop, lane, out.cops[row, index])
-                _copy(W, rows.gradient, lane, out.gradient[row, index])
-                out.doubtful[row, index] = get(W, rows.doubt, lane) != 0.0
+                _copy(W, rows.contact_wrench, lane, out.wrenches[row, column])
+                _copy(W, rows.torque + 1, lane, out.torques[row, column])
+                _copy(W, rows.cop, lane, out.cops[row, column])
+                _copy(W, rows.gradient, lane, out.gradient[row, column])
+                _copy(W, rows.margin, lane, out.margin[row, column])
+                if gains:
+                    _copy(W, rows.gain, lane, out.com_gain[row, column])
+                    _copy(W, rows.travel, lane, out.com_travel[row, column])
+                for k in range(nc):
+                    share = get(W, rows.contact_wrench + 6 * k + 2, lane) / feet.weight
+                    out.load_share[row, column, k] = share
+                out.doubtful[row, column] = get(W, rows.doubt, lane) != 0.0
         mass = tree.carried[0]
         for lane in range(count):
             for j in range(3):

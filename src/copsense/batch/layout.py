@@ -100,6 +100,11 @@ class Layout:
     tree: Tree
     feet: Feet
 
+    @property
+    def parts(self) -> tuple[Tree, Feet]:
+        """Both, in the order that kernels take them."""
+        return self.tree, self.feet
+
 
 def not_covered(robot: Robot, contacts: tuple[Contact, ...]) -> str:
     """Why the kernel does not serve this robot on these contacts; empty where it does."""

@@ -55,6 +55,15 @@ class Rows(NamedTuple):
         contact_wrench: in contact axes, about the contact frames' origins (nc, 6).
         cop: (nc, 2).
         gradient: of the CoPs (nc, 2, nv).
+        inertia: of each body and what it carries, about o (n + 1, 6).
+        H: M, then its factor L, by rows (nv, nv).
+        diagonal: of M (nv,).
+        Y: L^-T J', then its orthonormal factor, by columns (r + 6, 6 + ns).
+        RY: its triangular factor (r + 6, r + 6).
+        motion: of unit CoM velocity along x and y (2, nv).
+        gain: Gamma (nc, 2, 2).
+        margin: distance of each CoP to its sole's edge (nc,).
+        travel: of the CoM before a contact tips (nc,).
         size: rows in all.
     """
 
@@ -100,6 +109,15 @@ class Rows(NamedTuple):
     contact_wrench: int
     cop: int
     gradient: int
+    inertia: int
+    H: int
+    diagonal: int
+    Y: int
+    RY: int
+    motion: int
+    gain: int
+    margin: int
+    travel: int
     size: int
 
 
@@ -151,6 +169,15 @@ def rows(layout: Layout, nq: int) -> Rows:
         "contact_wrench": 6 * nc,
         "cop": 2 * nc,
         "gradient": 2 * nc * nv,
+        "inertia": 6 * (n + 1),
+        "H": nv * nv,
+        "diagonal": nv,
+        "Y": (r + 6) * (6 + ns),
+        "RY": (r + 6) * (r + 6),
+        "motion": 2 * nv,
+        "gain": 4 * nc,
+        "margin": nc,
+        "travel": nc,
     }
     starts, end = {}, 0
     for name, size in sizes.items():

@@ -13,10 +13,11 @@ the wrenches' own rows below.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from copsense.batch.choice import WEIGHTED, Choices
 from copsense.batch.lanes import (
     add3,
     along,
@@ -44,24 +45,7 @@ from copsense.batch.loops import (
 )
 from copsense.batch.rows import Rows
 
-LEAST_WRENCH, LEAST_TORQUE, WEIGHTED = 0, 1, 2
 _UNLOADED = 2e-9  # share of the weight; nearer to none, the clear path decides
-
-
-class Choices(NamedTuple):
-    """Criteria as numbers.
-
-    Attributes:
-        kind: least wrench, least torque (one weight for all), or anything weighted (nk,).
-        joint: weight of each joint's torque (nk, n + 1).
-        force: weight of every contact's force (nk,).
-        moment: weight of every surface contact's moment (nk,).
-    """
-
-    kind: np.ndarray
-    joint: np.ndarray
-    force: np.ndarray
-    moment: np.ndarray
 
 
 @compiled
