@@ -8,10 +8,12 @@ rank, a contact without load or off its plane. Without Numba the clear path answ
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -60,6 +62,7 @@ class BatchKernel:
                 f"{', '.join(names) or 'none'}. Give at least one; Criterion.named(...) renames one."
             )
         self.names = tuple(names)
+        self._single: Any = None
         self._choices = choices(stance, self.criteria)
         self.why_clear = not_covered(stance.robot, stance.contacts)
         if not self.why_clear and importlib.util.find_spec("numba") is None:
@@ -99,10 +102,50 @@ class BatchKernel:
                 reasons[row, column] = reason
         return replace(result, reasons=reasons)
 
+    def one(self, q: np.ndarray) -> BatchResult:
+        """Evaluate one configuration (nq,), for a controller's loop: nothing is allocated.
+
+        Returns:
+            One row, overwritten by the next call.
+
+        Raises:
+            InvalidInputError: a configuration that is no contiguous array of nq floats, not finite
+                or not normalised.
+        """
+        if self._single is None:
+            self._single = self._single_kernel()
+        single, doubtful = self._single, range(len(self.names))
+        if not _is_row(q, self.stance.robot.model.nq):
+            q = self.stance.robot.check_configuration(q)
+        if not isinstance(single, BatchResult):
+            single.evaluate(q[None])
+            result, flags = single.result, single.doubtful
+            if not flags.any():
+                return result
+            doubtful = [j for j in doubtful if flags[j]]
+        else:
+            result = single
+        self.stance.robot.check_configuration(q)
+        reasons = {}
+        for j in doubtful:
+            reason = fill_row(self.stance, q, self.criteria[j], result, 0, j)
+            if reason:
+                reasons[0, j] = reason
+        return replace(result, reasons=reasons)
+
+    def _single_kernel(self) -> Any:
+        """What `one` runs: a kernel, or for the clear path alone a row to fill."""
+        empty = self.empty(1)
+        if self.why_clear:
+            return empty
+        from copsense.batch.single import Single
+
+        return Single(self._layout, self._choices, self._rows, empty, self.gains)
+
     def _run(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         kernel, lanes = _kernel()
         out = kernel.Out(
-            **{n: a.reshape(*a.shape[:2], -1) for n, a in _arrays(result).items() if n != "com"},
+            **{n: _flat(a) for n, a in _arrays(result).items() if n != "com"},
             com=result.com,
             doubtful=doubtful,
         )
@@ -202,6 +245,16 @@ def _kernel() -> tuple[ModuleType, ModuleType]:
 
 def _arrays(result: BatchResult) -> dict[str, np.ndarray]:
     return {name: getattr(result, name) for name in array_names()}
+
+
+def _flat(array: np.ndarray) -> np.ndarray:
+    """The same memory with one axis after posture and criterion (-1 fails on empty arrays)."""
+    return array.reshape(*array.shape[:2], math.prod(array.shape[2:]))
+
+
+def _is_row(value: object, nq: int) -> bool:
+    plain = isinstance(value, np.ndarray) and value.dtype == np.float64
+    return plain and value.shape == (nq,) and value.flags.c_contiguous  # type: ignore[attr-defined,no-any-return]
 
 
 def _is_plain(value: object) -> bool:

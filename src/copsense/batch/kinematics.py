@@ -37,12 +37,13 @@ from copsense.batch.rows import Rows
 # Nearer than this to the limits of `Stance`'s checks, the clear path decides.
 _HEIGHT = 0.5e-6  # m
 _TILT = 0.5e-6  # rad
+_UNIT = 1e-6  # by which the square of a quaternion's length may miss one
 
 
 @compiled
 def move(tree: Tree, rows: Rows, W: Any) -> None:
     """Rotations and positions of the bodies, their first moments, screws and gravity."""
-    _place_base(tree, rows, W)
+    uneven = _place_base(tree, rows, W)
     n = len(tree.parent) - 1
     largest = splat(W, 0.0)
     for i in range(1, n + 1):
@@ -61,7 +62,9 @@ def move(tree: Tree, rows: Rows, W: Any) -> None:
         else:
             if tree.kind[i] == CONTINUOUS:  # q holds (cos, sin)
                 c, s = q, load(W, rows.q + tree.column[i] + 1)
-                length = root(c * c + s * s)
+                square = c * c + s * s
+                off, length = magnitude(square - 1.0), root(square)
+                uneven = where_less(uneven, off, off, uneven)
                 c, s = c / length, s / length
             else:
                 s, c = sine_cosine(q)
@@ -70,16 +73,18 @@ def move(tree: Tree, rows: Rows, W: Any) -> None:
             store3(W, here + 3, sub3(scale3(c, y), scale3(s, x)))
         store3(W, here + 6, z)
         store3(W, rows.position + 3 * i, p)
-    store(W, rows.flag, where_less(largest, LARGEST_ANGLE, splat(W, 0.0), splat(W, 1.0)))
+    flag = where_less(largest, LARGEST_ANGLE, splat(W, 0.0), splat(W, 1.0))
+    store(W, rows.flag, where_less(uneven, _UNIT, flag, splat(W, 1.0)))
     _carry(tree, rows, W)
 
 
 @compiled
-def _place_base(tree: Tree, rows: Rows, W: Any) -> None:
-    """R(q) of the quaternion, and the base's origin, from where the model roots it."""
+def _place_base(tree: Tree, rows: Rows, W: Any) -> Any:
+    """R(q) and the base's origin from where the model roots it; how far from unit q is."""
     x, y, z = load3(W, rows.q + 3)
     w = load(W, rows.q + 6)
-    two = 2.0 / (x * x + y * y + z * z + w * w)
+    square = x * x + y * y + z * z + w * w
+    two = 2.0 / square
     columns = (
         (1.0 - two * (y * y + z * z), two * (x * y + z * w), two * (x * z - y * w)),
         (two * (x * y - z * w), 1.0 - two * (x * x + z * z), two * (y * z + x * w)),
@@ -91,6 +96,7 @@ def _place_base(tree: Tree, rows: Rows, W: Any) -> None:
         store(W, rows.position + k, splat(W, 0.0))
     o = _rooted(t, load3(W, rows.q))
     store3(W, rows.base, (o[0] + t[9], o[1] + t[10], o[2] + t[11]))
+    return magnitude(square - 1.0)
 
 
 @compiled
