@@ -42,7 +42,7 @@ def choices(stance: Stance, criteria: Sequence[Criterion | WrenchLaw]) -> Choice
         norm = _norm(stance, quadratic)
         W = quadratic.torque
         weights = np.diag(W)
-        if norm is None or quadratic.inertia or np.any(W != np.diag(weights)):
+        if norm is None or quadratic.inertia or np.any(np.diag(weights) != W):
             continue
         torque, wrench = bool(np.any(weights > 0)), bool(norm[0] > 0 or norm[1] > 0)
         if not torque and not (norm[0] > 0 and norm[1] > 0):
@@ -72,7 +72,7 @@ def _norm(stance: Stance, quadratic: Quadratic) -> tuple[float, float] | None:
     """Weights of forces and of moments where W_f is a norm of wrenches about zero, else None."""
     W, components = quadratic.wrench, stance.component_index
     weights = np.diag(W)
-    if np.any(quadratic.pull != 0) or np.any(W != np.diag(weights)):
+    if np.any(quadratic.pull != 0) or np.any(np.diag(weights) != W):
         return None
     forces, moments = weights[components < 3], weights[components >= 3]
     if np.any(forces != forces[0]) or (len(moments) and np.any(moments != moments[0])):

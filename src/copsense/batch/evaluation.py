@@ -58,8 +58,8 @@ class BatchKernel:
         names = [str(c.name) if isinstance(c, Criterion) else law_name(c) for c in criteria]
         if not names or len(set(names)) != len(names):
             raise InvalidInputError(
-                "a batch needs criteria of distinct names, got "
-                f"{', '.join(names) or 'none'}. Give at least one; Criterion.named(...) renames one."
+                f"a batch needs criteria of distinct names, got {', '.join(names) or 'none'}. "
+                "Give at least one; Criterion.named(...) renames one."
             )
         self.names = tuple(names)
         self._single: Any = None
@@ -114,21 +114,21 @@ class BatchKernel:
         """
         if self._single is None:
             self._single = self._single_kernel()
-        single, doubtful = self._single, range(len(self.names))
-        if not _is_row(q, self.stance.robot.model.nq):
-            q = self.stance.robot.check_configuration(q)
-        if not isinstance(single, BatchResult):
-            single.evaluate(q[None])
-            result, flags = single.result, single.doubtful
-            if not flags.any():
-                return result
-            doubtful = [j for j in doubtful if flags[j]]
+        single, row = self._single, q
+        if not _is_row(row, self.stance.robot.model.nq):
+            row = self.stance.robot.check_configuration(row)
+        if isinstance(single, BatchResult):
+            result, doubtful = single, list(range(len(self.names)))
         else:
-            result = single
-        self.stance.robot.check_configuration(q)
+            single.evaluate(row[None])
+            result = single.result
+            if not single.doubtful.any():
+                return result
+            doubtful = [int(j) for j in np.flatnonzero(single.doubtful)]
+        self.stance.robot.check_configuration(row)
         reasons = {}
         for j in doubtful:
-            reason = fill_row(self.stance, q, self.criteria[j], result, 0, j)
+            reason = fill_row(self.stance, row, self.criteria[j], result, 0, j)
             if reason:
                 reasons[0, j] = reason
         return replace(result, reasons=reasons)
@@ -253,8 +253,12 @@ def _flat(array: np.ndarray) -> np.ndarray:
 
 
 def _is_row(value: object, nq: int) -> bool:
-    plain = isinstance(value, np.ndarray) and value.dtype == np.float64
-    return plain and value.shape == (nq,) and value.flags.c_contiguous  # type: ignore[attr-defined,no-any-return]
+    return (
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and value.shape == (nq,)
+        and value.flags.c_contiguous
+    )
 
 
 def _is_plain(value: object) -> bool:

@@ -164,5 +164,3 @@ def margins(feet: Feet, rows: Rows, W: Any, travel: bool) -> None:
         store(W, rows.margin + k, least)
         if travel:
             store(W, rows.travel + k, where_less(beyond, 0.0, splat(W, -np.inf), free))
-
-

@@ -49,9 +49,7 @@ def move(tree: Tree, rows: Rows, W: Any) -> None:
     for i in range(1, n + 1):
         up, here = rows.rotation + 9 * tree.parent[i], rows.rotation + 9 * i
         t = tree.placement[i]
-        p = add3(
-            load3(W, rows.position + 3 * tree.parent[i]), _turn(W, up, t[9], t[10], t[11])
-        )
+        p = add3(load3(W, rows.position + 3 * tree.parent[i]), _turn(W, up, t[9], t[10], t[11]))
         x, y = _turn(W, up, t[0], t[1], t[2]), _turn(W, up, t[3], t[4], t[5])
         z = _turn(W, up, t[6], t[7], t[8])
         q = load(W, rows.q + tree.column[i])
@@ -157,9 +155,7 @@ def place_feet(feet: Feet, rows: Rows, W: Any) -> None:
     for k in range(len(feet.body)):
         up, here = rows.rotation + 9 * feet.body[k], rows.foot_rotation + 9 * k
         t = feet.placement[k]
-        r = add3(
-            load3(W, rows.position + 3 * feet.body[k]), _turn(W, up, t[9], t[10], t[11])
-        )
+        r = add3(load3(W, rows.position + 3 * feet.body[k]), _turn(W, up, t[9], t[10], t[11]))
         store3(W, rows.foot + 3 * k, r)
         if feet.point[k]:
             for j in range(9):

@@ -13,6 +13,7 @@ import inspect
 import math
 import operator
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,12 +22,20 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.np.unsafe.ndarray import to_fixed_tuple
 
 WIDTH = 8  # postures abreast
 CACHE_LINE = 64  # bytes; a row of eight that straddles two of them costs double
 
 _FLAGS = ("contract",)  # a * b + c in one instruction; nothing is reordered
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_STAMP = tuple(
+    (file.name, file.stat().st_mtime_ns, file.stat().st_size)
+    for file in sorted(Path(__file__).parent.glob("*.py"))
+)
+
+as_tuple = to_fixed_tuple  # so many entries of an array
 
 # What a kernel computes with: a float, or one per lane. Numba has its own types for them.
 Value = Any
@@ -38,9 +47,13 @@ def compiled(function: _Function) -> _Function:
     options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"}, "error_model": "numpy"}
     plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
     try:
-        return njit(cache=True, **options)(plain)  # type: ignore[no-any-return]
-    except RuntimeError:  # nowhere to write: compile again in every process
-        return njit(**options)(plain)  # type: ignore[no-any-return]
+        dispatcher = njit(cache=True, **options)(plain)
+        # Numba would look at the function's own file alone, and call an older version of a
+        # function from another one: machine code is of use while no file of the kernel changes.
+        dispatcher._cache._cache_file._source_stamp = _STAMP
+    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
+        dispatcher = njit(**options)(plain)
+    return dispatcher
 
 
 def workspace(rows: int, *, width: int = WIDTH) -> np.ndarray:
@@ -61,7 +74,7 @@ class Lanes(types.Type):  # type: ignore[misc]
         super().__init__(name=f"Lanes({width})")
 
 
-@register_model(Lanes)  # type: ignore[misc]
+@register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, ir.VectorType(ir.DoubleType(), fe_type.width))
@@ -101,7 +114,7 @@ def _widest(*given: Any) -> Any:
 def _define(operation: Any, instruction: str) -> None:
     """`a operation b` where one of them is lanes."""
 
-    @infer_global(operation)  # type: ignore[misc]
+    @infer_global(operation)
     class Template(AbstractTemplate):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
             lanes = [a for a in args if isinstance(a, Lanes)]
@@ -134,9 +147,11 @@ class _Negative(AbstractTemplate):  # type: ignore[misc]
         return signature(_LANES, *args) if isinstance(args[0], Lanes) else None
 
 
-@lower_builtin(operator.neg, Lanes)  # type: ignore[misc]
 def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
+
+
+lower_builtin(operator.neg, Lanes)(_negative)
 
 
 def _primitive(function: Callable[..., Any]) -> Any:

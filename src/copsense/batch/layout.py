@@ -162,7 +162,11 @@ def _tree(robot: Robot, turns: list[np.ndarray]) -> Tree:
     placement, mass = np.zeros((n + 1, 12)), np.zeros(n + 1)
     moment, inertia = np.zeros((n + 1, 3)), np.zeros((n + 1, 6))
     for i in range(n + 1):
-        joint, place, body = model.joints[i + 1], model.jointPlacements[i + 1], model.inertias[i + 1]
+        joint, place, body = (
+            model.joints[i + 1],
+            model.jointPlacements[i + 1],
+            model.inertias[i + 1],
+        )
         above = turns[parent[i]] if i else np.eye(3)
         kind[i] = _kind(joint) if i else REVOLUTE
         column[i] = joint.idx_q

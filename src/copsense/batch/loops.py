@@ -239,10 +239,7 @@ def expand(feet: Feet, rows: Rows, W: Any, y: int, b: int, out: int) -> None:
     for k in feet.order[feet.held :]:
         at = y + feet.first[k]
         f = load3(W, at)
-        if feet.point[k]:
-            m = cross3(load3(W, rows.foot + 3 * k), f)
-        else:
-            m = load3(W, at + 3)
+        m = cross3(load3(W, rows.foot + 3 * k), f) if feet.point[k] else load3(W, at + 3)
         store3(W, out + 6 * k, f)
         store3(W, out + 6 * k + 3, m)
         F, M = sub3(F, f), sub3(M, m)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -81,5 +82,5 @@ def empty_result(
         "load_share": (count, nk, nc),
         "com": (count, 3),
     }
-    arrays = {name: np.full(shape, np.nan) for name, shape in shapes.items()}
+    arrays: dict[str, Any] = {name: np.full(shape, np.nan) for name, shape in shapes.items()}
     return BatchResult(criteria, stance.contact_names, **arrays)

@@ -153,7 +153,14 @@ def _weigh(feet: Feet, rows: Rows, W: Any, choices: Choices, index: int) -> None
 
 @compiled
 def _wrench_rows(
-    feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, wrenches: int, at: int, sign: float
+    feet: Feet,
+    rows: Rows,
+    W: Any,
+    choices: Choices,
+    index: int,
+    wrenches: int,
+    at: int,
+    sign: float,
 ) -> None:
     """sign W_f^(1/2) f of wrenches phi: forces, and moments about the contacts' own origins."""
     force, moment = sign * np.sqrt(choices.force[index]), sign * np.sqrt(choices.moment[index])
@@ -192,5 +199,3 @@ def finish(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
         store(W, rows.cop + 2 * k + 1, m[0] / f[2])
         doubt = where_less(_UNLOADED * feet.weight, magnitude(f[2]), doubt, splat(W, 1.0))
     store(W, rows.doubt, doubt)
-
-

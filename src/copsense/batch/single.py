@@ -10,11 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from copsense.batch.choice import Choices
 from copsense.batch.kernel import Out, run
-from copsense.batch.lanes import compiled, workspace
+from copsense.batch.lanes import as_tuple, compiled, workspace
 from copsense.batch.layout import Feet, Layout, Tree
 from copsense.batch.result import BatchResult, array_names
 from copsense.batch.rows import Rows
@@ -39,7 +38,7 @@ class Single:
         arrays = [getattr(empty, name) for name in names]
         values = np.concatenate([*[a.ravel() for a in arrays], np.ones(nk)])
         ends = np.cumsum([0] + [a.size for a in arrays])
-        views = {
+        views: dict[str, Any] = {
             name: values[start : start + a.size].reshape(a.shape)
             for name, a, start in zip(names, arrays, ends[:-1], strict=True)
         }
@@ -55,7 +54,10 @@ class Single:
 def pack(
     layout: Layout, choices: Choices, rows: Rows, gains: bool, names: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A layout and the criteria served, of `names` in all, as one array of whole numbers and one of floats."""
+    """A layout and the criteria served as whole numbers and as floats.
+
+    Results have room for `names` criteria in all.
+    """
     tree, feet = layout.parts
     counts = [
         len(tree.parent),
@@ -106,7 +108,7 @@ def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> None:
     anchor, edge_first = ints[i : i + b], ints[i + b : i + b + nc + 1]
     i += b + nc + 1
     columns, kinds = ints[i : i + nk], ints[i + nk : i + 2 * nk]
-    rows = Rows(*to_fixed_tuple(ints[i + 2 * nk :], _ROWS))
+    rows = Rows(*as_tuple(ints[i + 2 * nk :], _ROWS))
     placement, f = floats[: 12 * b].reshape(b, 12), 12 * b
     mass, moment = floats[f : f + b], floats[f + b : f + 4 * b].reshape(b, 3)
     inertia, carried = floats[f + 4 * b : f + 10 * b].reshape(b, 6), floats[f + 10 * b : f + 11 * b]
