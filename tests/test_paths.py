@@ -120,3 +120,14 @@ def test_path_through_refuses_a_moved_contact_and_projects_on_request(icub, late
     assert contacts_moved(path, icub) < MET
     for here, given in zip(path.stances, moved, strict=True):
         assert 0 < np.abs(pin.difference(icub.robot.model, given, here.q)).max() < 1e-3
+
+
+def test_a_bad_configuration_of_a_list_is_a_failure_if_asked(icub, lateral_path):
+    rows = [s.q.copy() for s in lateral_path.stances[:4]]
+    rows[1][10] += 0.01  # a leg's joint: the foot is no more where it was
+    rows[2][9] = np.nan
+    path = copsense.path_through(icub, rows, strict=False)
+    assert list(path.failures) == [1, 2]
+    assert "configuration 1 has a contact" in path.failures[1]
+    assert "not finite" in path.failures[2] or "finite" in path.failures[2]
+    assert len(path) == 4

@@ -68,3 +68,22 @@ def test_locked_joints_keep_their_mass(icub):
     assert len(icub.robot.joint_names) == 23
     assert icub.robot.mass == pytest.approx(whole.mass, rel=1e-12)
     assert icub.robot.model.nv == 29
+
+
+def test_a_contact_that_the_user_placed_stays_there():
+    feet = [
+        copsense.Contact(frame, offset=(0.0, 0.0, 0.03))
+        for frame in ("left_sole_link", "right_sole_link")
+    ]
+    stance = copsense.load_stance("talos", contacts=feet)
+    assert all(contact.offset == (0.0, 0.0, 0.03) for contact in stance.contacts)
+    assert all(contact.polygon is not None for contact in stance.contacts)
+    asked = copsense.load_stance("talos", contacts=feet, contact_at="sole")
+    assert all(abs(contact.offset[2]) < 1e-3 for contact in asked.contacts)
+    with_outline = [
+        copsense.Contact(f, polygon=copsense.rectangle((-0.05, 0.1), (-0.03, 0.03)))
+        for f in ("l_sole", "r_sole")
+    ]
+    lowered = copsense.load_stance("iCubGenova04", contacts=with_outline)
+    assert lowered.contacts[0].offset[2] == pytest.approx(-0.0105, abs=1e-5)
+    assert len(lowered.contacts[0].polygon) == 4

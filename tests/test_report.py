@@ -137,10 +137,11 @@ def test_the_summary_has_the_numbers(reproduction):
 
 def test_every_erratum_reference_value_and_version_is_on_the_page(page, text, reproduction):
     words = " ".join("".join(page.text["body"]).split())
-    assert len(page.all("table")) == 4
+    assert len(page.all("table")) == 5
     cells = sum(tag == "tr" for tag, _ in page.tags)
-    rows = (reproduction.claims, reproduction.errata, reproduction.references)
-    assert cells == 4 + sum(len(r) for r in rows)
+    bindings = reproduction.within_limits.bindings
+    rows = (reproduction.claims, reproduction.errata, reproduction.references, bindings)
+    assert cells == 5 + sum(len(r) for r in rows)
     for name, version in reproduction.versions.items():
         assert f"<dt>{name}</dt><dd>{version}</dd>" in text
     assert "amplitude" in words

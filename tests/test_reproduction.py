@@ -204,3 +204,22 @@ def test_a_sweep_that_lacks_something_is_refused(reproduction):
 def test_the_first_crossing_is_found_between_the_samples(values, where):
     x = np.array([-1.0, 0.0, 1.0, 2.0])
     assert math.isclose(first_crossing(x, np.array(values)), where)
+
+
+def test_limits_bind_where_the_reference_soles_end_and_the_other_foot_pays():
+    within = small_reproduction().within_limits
+    found = {(b.criterion, b.com_y > 0): b for b in within.bindings}
+    assert abs(found["minimum-wrench", True].com_y - 0.0384) < 1e-4
+    assert abs(found["minimum-torque", True].com_y - 0.0459) < 1e-4
+    for binding in found.values():
+        held = 1 if binding.com_y > 0 else 0  # the unloading foot is held at its edge
+        assert abs(binding.after[held, 1]) < 0.01 < 1.0 < binding.before[held, 1] + 0.05
+        assert binding.after[1 - held, 1] > 1.9 * binding.before[1 - held, 1]
+
+
+def test_regions_are_nested():
+    regions = small_reproduction().within_limits.regions
+    areas = [region.area for region in regions.values()]
+    assert areas[0] >= areas[1] > max(areas[2:])
+    for vertex in regions["minimum-torque"].polygon:
+        assert regions["and torque limits"].margin(vertex) > -1e-6

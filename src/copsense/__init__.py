@@ -2,10 +2,12 @@
 
 The public names, in the order of the flow: a robot stands on contacts (a stance); a criterion
 shares its load among them (an equilibrium); each contact has a centre of pressure, and a
-sensitivity of it; a sweep evaluates many.
+sensitivity of it; limits clip the wrenches, and say how far the centre of mass may go; a sweep
+evaluates many, and a design chooses the criterion.
 """
 
 from copsense._version import __version__
+from copsense.binding import FirstBinding, first_binding
 from copsense.contact import Contact, Plane, rectangle
 from copsense.cop import (
     EdgeMargin,
@@ -30,10 +32,19 @@ from copsense.criterion import (
     reference_wrench,
     weighted_torque,
 )
-from copsense.equilibrium import StaticEquilibrium, solve_equilibrium, wrench_law
+from copsense.design import Design, design_criterion, families
+from copsense.equilibrium import (
+    ConstrainedEquilibrium,
+    StaticEquilibrium,
+    solve_equilibrium,
+    wrench_law,
+)
 from copsense.errors import CopsenseError
+from copsense.limits import Limits
+from copsense.margins import limit_margins, limit_travel
 from copsense.motion import Path, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
+from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robot import Robot
 from copsense.robots import (
     PRESETS,
@@ -58,11 +69,16 @@ from copsense.sweep import failed_rows, sweep
 __all__ = [
     "CRITERIA",
     "PRESETS",
+    "ComRegion",
+    "ConstrainedEquilibrium",
     "Contact",
     "CopSensitivity",
     "CopsenseError",
     "Criterion",
+    "Design",
     "EdgeMargin",
+    "FirstBinding",
+    "Limits",
     "Path",
     "Plane",
     "Posture",
@@ -77,17 +93,24 @@ __all__ = [
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
+    "com_region",
     "contact_cops",
     "cop_sensitivity",
     "criterion_named",
+    "criterion_region",
+    "design_criterion",
     "edge_margin",
     "failed_rows",
+    "families",
     "finite_difference_sensitivity",
+    "first_binding",
     "foot_rotation_indicator",
     "four_bar_angles",
     "four_bar_robot",
     "joint_sweep",
     "lateral_sweep",
+    "limit_margins",
+    "limit_travel",
     "load_results",
     "load_robot",
     "load_stance",

@@ -128,7 +128,8 @@ def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, 
     """
     array = finite_array(points, f"the polygon of contact {label!r}", (None, 2), "x, y [m]")
     # Andrew's monotone chain: no dependency on a hull that refuses flat input.
-    ordered = [tuple(p) for p in np.unique(array, axis=0)]
+    # Rounded to the picometre: noise in x would put the points of an upright edge out of order.
+    ordered = [tuple(p) for p in np.unique(np.round(array, 12) + 0.0, axis=0)]
     _require(
         len(ordered) >= 2,
         f"the polygon of contact {label!r} is a single point. Give two or more, or make the "
@@ -146,6 +147,29 @@ def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, 
     hull = np.array(half(ordered) + half(ordered[::-1]))
     hull.flags.writeable = False
     return hull
+
+
+def half_planes(
+    polygon: Float[np.ndarray, "k 2"],
+) -> tuple[Float[np.ndarray, "e 2"], Float[np.ndarray, " e"]]:
+    """Outward unit normals a and offsets b of a sole's edges: inside where a p <= b.
+
+    A sole of two points (a line) has its two ends as edges.
+    """
+    if len(polygon) == 2:
+        along = (polygon[1] - polygon[0]) / np.linalg.norm(polygon[1] - polygon[0])
+        normals = np.array([-along, along])
+        return normals, np.array([normals[0] @ polygon[0], normals[1] @ polygon[1]])
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, np.sum(normals * polygon, axis=1)
+
+
+def edge_side(normal: Float[np.ndarray, " 2"]) -> str:
+    """The side of the contact frame that an edge faces, by its outward normal."""
+    quarter = int(np.round(np.arctan2(normal[1], normal[0]) / (np.pi / 2))) % 4
+    return ("+x (front)", "+y (left)", "-x (back)", "-y (right)")[quarter]
 
 
 def _turn(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:

@@ -10,12 +10,10 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
-from copsense.contact import Plane
+from copsense.contact import Plane, edge_side, half_planes
 from copsense.equilibrium import StaticEquilibrium
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.stance import Stance
-
-_EDGE_NAMES = ("+x (front)", "+y (left)", "-x (back)", "-y (right)")
 
 
 @dataclass(frozen=True)
@@ -148,30 +146,9 @@ def foot_rotation_indicator(
         shape, meaning = (len(names), 6), "in contact axes, force first"
         others = finite_array(other_wrenches, "other_wrenches", shape, meaning).copy()
         others[k] = 0.0
-        world = [
-            np.concatenate([p.rotation @ w[:3], p.rotation @ w[3:]])
-            for p, w in zip(stance.placements, others, strict=True)
-        ]
-        taken_f, taken_m = _resultant(stance, np.array(world))
+        taken_f, taken_m = _resultant(stance, stance.in_world_axes(others))
         force, moment = force - taken_f, moment - taken_m
     return center_of_pressure(force, moment, plane)
-
-
-def half_planes(
-    polygon: Float[np.ndarray, "k 2"],
-) -> tuple[Float[np.ndarray, "e 2"], Float[np.ndarray, " e"]]:
-    """Outward unit normals a and offsets b of a sole's edges: inside where a p <= b.
-
-    A sole of two points (a line) has its two ends as edges.
-    """
-    if len(polygon) == 2:
-        along = (polygon[1] - polygon[0]) / np.linalg.norm(polygon[1] - polygon[0])
-        normals = np.array([-along, along])
-        return normals, np.array([normals[0] @ polygon[0], normals[1] @ polygon[1]])
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.sum(normals * polygon, axis=1)
 
 
 def edge_margin(polygon: Float[np.ndarray, "k 2"], point: ArrayLike) -> EdgeMargin:
@@ -192,8 +169,7 @@ def edge_margin(polygon: Float[np.ndarray, "k 2"], point: ArrayLike) -> EdgeMarg
     normals, offsets = half_planes(corners)
     distances = offsets - normals @ finite_array(point, "the point", (2,), "x, y [m]")
     edge = int(np.argmin(distances))
-    quarter = int(np.round(np.arctan2(normals[edge, 1], normals[edge, 0]) / (np.pi / 2))) % 4
-    return EdgeMargin(float(distances[edge]), edge, _EDGE_NAMES[quarter], normals[edge])
+    return EdgeMargin(float(distances[edge]), edge, edge_side(normals[edge]), normals[edge])
 
 
 def _resultant(stance: Stance, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

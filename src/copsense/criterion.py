@@ -32,7 +32,8 @@ class TorqueTerm:
     Attributes:
         weights: a number for every joint; joint name -> number (others 0); a vector (n,); a
             symmetric positive-definite matrix (n, n); ``"1/limit^2"`` for the model's effort
-            limits; or ``"inverse inertia"`` for the inverse of the joint block of M(q).
+            limits; or ``"inverse inertia"`` for the inverse of the joint block of M(q), which
+            depends on which link is the model's base.
         scale: factor of the term, positive.
     """
 

@@ -7,7 +7,7 @@ import tempfile
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -39,12 +39,14 @@ class Description:
         language: ``"urdf"`` or ``"mjcf"``.
         package_dirs: folders in which ``package://`` meshes are looked up.
         path: the file the text came from, if any.
+        altered: whether the text is no longer the file's (see `_one_joint_a_body`).
     """
 
-    text: str
+    text: str = field(repr=False)
     language: Language
     package_dirs: tuple[str, ...] = ()
     path: Path | None = None
+    altered: bool = False
 
 
 class mjcf_file:  # noqa: N801 - a context manager, used like a function
@@ -57,7 +59,7 @@ class mjcf_file:  # noqa: N801 - a context manager, used like a function
 
     def __enter__(self) -> str:
         """Return the path."""
-        if self.description.path is not None:
+        if self.description.path is not None and not self.description.altered:
             return str(self.description.path)
         self.folder = tempfile.TemporaryDirectory()
         path = Path(self.folder.name) / "model.xml"
@@ -135,7 +137,42 @@ def load_description(
         raise ModelLoadError(
             f"{name} is no sound {found.upper()}: {'; '.join(faults[:5])}{more}. Correct the file."
         )
-    return Description(text, found, tuple(str(folder) for folder in package_dirs), path)
+    altered = found == "mjcf" and _one_joint_a_body(root, path)
+    if altered:
+        text = ET.tostring(root, encoding="unicode")
+    return Description(text, found, tuple(str(folder) for folder in package_dirs), path, altered)
+
+
+def _one_joint_a_body(root: ET.Element, path: Path | None) -> bool:
+    """Give each joint of an MJCF body with several a body of its own; whether any had.
+
+    Pinocchio makes one composite joint of them, which has no single angle to name and whose
+    derivatives it does not know. Nested bodies without mass move alike, joint by joint.
+    """
+    altered = False
+    for body in list(root.iterfind("worldbody//body")):
+        joints = [child for child in body if child.tag == "joint" and child.get("type") != "free"]
+        if len(joints) < 2:
+            continue
+        altered = True
+        name, rest = body.get("name", "body"), [c for c in body if c not in joints[:-1]]
+        inner = body
+        for child in list(body):
+            body.remove(child)
+        for number, joint in enumerate(joints[:-1]):
+            inner.set("name", f"{name}/{joint.get('name', number)}")
+            inner.append(joint)
+            inner = ET.SubElement(inner, "body")
+        inner.set("name", name)  # the last carries the joint, the shapes and the children
+        inner.extend(rest)
+    if altered and path is not None:
+        # Read from elsewhere now: what was relative to the file stays so.
+        compilers = root.findall("compiler") or [ET.SubElement(root, "compiler")]
+        for compiler in compilers:
+            for folder in ("meshdir", "texturedir", "assetdir"):
+                if folder == "meshdir" or compiler.get(folder):
+                    compiler.set(folder, str((path.parent / compiler.get(folder, "")).absolute()))
+    return altered
 
 
 def _urdf_faults(root: ET.Element) -> Iterator[str]:

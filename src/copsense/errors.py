@@ -125,3 +125,46 @@ class SensitivityMismatchError(CopsenseError):
 
 class OutputError(CopsenseError):
     """A file cannot be written where it was asked for, or would overwrite another."""
+
+
+class InfeasibleError(CopsenseError):
+    """No contact wrench respects the limits.
+
+    Attributes:
+        violation: the least amount by which every limit would have to give way [N, Nm].
+        demands: the limits that demand it.
+    """
+
+    def __init__(self, violation: float, demands: tuple[str, ...]) -> None:
+        """Compose the message from the violation and who demands it."""
+        self.violation, self.demands = violation, demands
+        super().__init__(
+            f"no wrench balances the robot within the limits: each would have to give way by "
+            f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax "
+            "one of these limits, or move the posture."
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.violation, self.demands)
+
+
+class UnsolvedError(CopsenseError):
+    """A quadratic program that has solutions was not solved well enough to be believed.
+
+    Attributes:
+        error: the smallest violation of an optimality condition that was reached, relative.
+    """
+
+    def __init__(self, error: float) -> None:
+        """Compose the message from the violation."""
+        self.error = error
+        super().__init__(
+            f"the wrenches within the limits were not found: {error:.1e} of an optimality "
+            "condition remains. Weights of very different size, or limits that all but exclude "
+            "each other, can cause this; bring the weights nearer or relax a limit."
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.error,)

@@ -30,7 +30,7 @@ class Path:
         values: the coordinate at each posture (N,).
         tangents: dq/dcoordinate at each posture (N, nv), with J t = 0.
         failures: index of a posture that could not be reached -> the reason; the stance kept
-            there is the nearest one found.
+            there is the one that the path began with.
     """
 
     stances: tuple[Stance, ...]
@@ -88,6 +88,22 @@ def lateral_sweep(
     return _sweep(stance, "com_y", "m", values, float(stance.com[1]), request, column, progress)
 
 
+def lateral_posture(
+    stance: Stance, y: float, *, near: Stance | None = None
+) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    """The posture of a stance's lateral path at one CoM y, and dq/dy there.
+
+    Args:
+        stance: the posture that the path stays nearest to; its CoM x is held.
+        y: world y of the CoM [m].
+        near: where to start the search; default `stance`.
+    """
+    planar = stance.robot.base_nv != 6
+    com = (None if planar else float(stance.com[0]), y, None)
+    found = solve_posture(near or stance, com=com, reference=stance.q)
+    return found.stance, found.tangents[:, 0 if planar else 1]
+
+
 def joint_sweep(
     stance: Stance,
     joint: str,
@@ -121,7 +137,11 @@ def joint_sweep(
 
 
 def path_through(
-    stance: Stance, configurations: Iterable[ArrayLike], *, project: bool = False
+    stance: Stance,
+    configurations: Iterable[ArrayLike],
+    *,
+    project: bool = False,
+    strict: bool = True,
 ) -> Path:
     """Make a path of a list of configurations, parametrised by their index.
 
@@ -133,32 +153,48 @@ def path_through(
         stance: says where the contacts are.
         configurations: the configurations (nq,), in order.
         project: move each onto the manifold instead of refusing one that has moved a contact.
+        strict: raise at a configuration that cannot be used; False lists it in `Path.failures`.
 
     Raises:
         InvalidInputError: no configuration, a bad one, or one with a contact over 1e-9 away.
     """
     stances: list[Stance] = []
+    failures: dict[int, str] = {}
     for number, q in enumerate(configurations):
-        found = stance.at(q, check=False)
-        error = float(np.abs(contact_error(found, stance.placements)).max())
-        if project:
-            found = pull_back(found, stance.placements)
-        elif error > 1e-9:
-            raise InvalidInputError(
-                f"configuration {number} has a contact {error:.2e} (m or rad) away from the "
-                "stance's. Give configurations with the contacts in place, or project=True."
-            )
-        stances.append(stance.at(found.q))
+        try:
+            stances.append(_placed(stance, q, number, project=project))
+        except CopsenseError as error:
+            if strict:
+                raise
+            failures[number] = str(error)
+            stances.append(stance)
     if not stances:
         raise InvalidInputError("the list of configurations is empty. Give at least one.")
     last = len(stances) - 1
     tangents = np.zeros((len(stances), stance.robot.model.nv))
     for i, here in enumerate(stances):
         a, b = max(i - 1, 0), min(i + 1, last)
+        # A neighbour that failed is no neighbour.
+        a, b = (i if a in failures else a), (i if b in failures else b)
         secant = pin.difference(stance.robot.model, stances[a].q, stances[b].q) / max(b - a, 1)
         basis = here.admissible_motions
         tangents[i] = basis @ (basis.T @ secant)
-    return Path(tuple(stances), "index", "1", np.arange(len(stances), dtype=float), tangents)
+    values = np.arange(len(stances), dtype=float)
+    return Path(tuple(stances), "index", "1", values, tangents, failures)
+
+
+def _placed(stance: Stance, q: ArrayLike, number: int, *, project: bool) -> Stance:
+    """A configuration of a list with the contacts in place, or an error that says its number."""
+    found = stance.at(q, check=False)
+    error = float(np.abs(contact_error(found, stance.placements)).max())
+    if project:
+        found = pull_back(found, stance.placements)
+    elif error > 1e-9:
+        raise InvalidInputError(
+            f"configuration {number} has a contact {error:.2e} (m or rad) away from the "
+            "stance's. Give configurations with the contacts in place, or project=True."
+        )
+    return stance.at(found.q)
 
 
 def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:

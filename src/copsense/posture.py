@@ -254,13 +254,22 @@ def _what_remains(
     joints: list[str],
     wanted: list[tuple[int, float]],
 ) -> str:
-    labels = [f"contact {row}" for row in stance.row_names]
-    labels += [f"CoM {'xyz'[i]}" for i in axes] + [f"joint {joint}" for joint in joints]
+    ways = ("along x", "along y", "along z", "about x", "about y", "about z")
+    labels = [
+        f"contact {c.name} {ways[i]} remains {{:.2e}} {'m' if i < 3 else 'rad'} off"
+        for c in stance.contacts
+        for i in c.components
+    ]
+    labels += [f"the CoM's {'xyz'[i]} remains {{:.2e}} m off" for i in axes]
+    labels += [f"joint {joint} remains {{:.2e}} (rad or m) off" for joint in joints]
     worst = int(np.argmax(np.abs(h)))
     asked = ", ".join(f"CoM {'xyz'[i]} = {round(value, 6) + 0.0:g} m" for i, value in wanted)
+    left = labels[worst].format(abs(h[worst]))
+    if abs(h[worst]) < TOLERANCE:
+        left = "they are in place, but the search for the nearest posture does not settle"
     return (
         f"no posture of {stance.robot.name!r} with the contacts in place was found"
         + (f" for {asked}" if asked else "")
-        + f": {labels[worst]} remains {abs(h[worst]):.2e} (m or rad) off. Ask for less, or start "
-        "from a nearer posture."
+        + f": {left}. Ask for less, start from a nearer posture, or leave out a contact that "
+        "says what another says already."
     )

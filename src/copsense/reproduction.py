@@ -6,7 +6,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -15,8 +15,10 @@ import xarray as xr
 from jaxtyping import Float
 
 from copsense._version import __version__
+from copsense.binding import FirstBinding, first_binding
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
+from copsense.limits import Limits
 from copsense.motion import Path, joint_sweep, lateral_sweep
 from copsense.paper import (
     EvaluatedClaim,
@@ -36,6 +38,7 @@ from copsense.paper import (
 )
 from copsense.paper.lateral import HIP_ROLL, SHORT, TORQUE, WRENCH
 from copsense.posture import PostureCost
+from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robots import PRESETS, load_stance
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
@@ -45,6 +48,8 @@ Progress = Callable[[str, int, int], object]
 
 _ROBOT, _MODEL = "icub", "iCubGenova04"
 _PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
+# What public balancing configurations for this robot use: mu = 1/3, torsion 1/75 m, f_z over 10 N.
+LIMITS = Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
 _LEAST = 5  # postures: fewer than this cannot show where anything crosses
 _LENGTHS = 25  # values of L in the figure on the unit of length
 
@@ -69,6 +74,24 @@ class UnitOfLength:
 
 
 @dataclass(frozen=True, eq=False)
+class WithinLimits:
+    """What limits on the contacts and the motors change (Remark 4).
+
+    Attributes:
+        limits: those of public balancing configurations for this robot.
+        lateral: the lateral sweep with the wrenches solved within them, criteria 1 and 2.
+        bindings: for each criterion and side, where the first limit binds and the slopes there.
+        regions: name -> region of the CoM, the widest first: friction and soles alone, with the
+            torques, and each criterion's own.
+    """
+
+    limits: Limits
+    lateral: xr.Dataset
+    bindings: tuple[FirstBinding, ...]
+    regions: Mapping[str, ComRegion]
+
+
+@dataclass(frozen=True, eq=False)
 class Reproduction:
     """What the paper's static half comes to.
 
@@ -79,6 +102,7 @@ class Reproduction:
             criteria 1 and 2 and criterion 1 with L = d/2.
         lateral_at_sole: the same with the contact frames at the bottom of the collision geometry.
         unit_of_length: criterion 1's dependence on L.
+        within_limits: the same path within limits, and the regions that they leave the CoM.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.
         changed_at_sole: identifiers of the iCub's claims whose verdict is another one with the
@@ -98,6 +122,7 @@ class Reproduction:
     lateral: xr.Dataset
     lateral_at_sole: xr.Dataset
     unit_of_length: UnitOfLength
+    within_limits: WithinLimits
     four_bar_claims: tuple[EvaluatedClaim, ...]
     icub_claims: tuple[EvaluatedClaim, ...]
     changed_at_sole: tuple[str, ...]
@@ -141,8 +166,9 @@ def reproduce(*, postures: int = 141, progress: Progress | None = None) -> Repro
         errata = evaluate_errata(four_bar)
     stance = load_stance(_ROBOT)
     lowered = load_stance(_ROBOT, contact_at="sole")
-    lateral = _lateral(stance, postures, clock, "iCub")
-    at_sole = _lateral(lowered, postures, clock, "iCub, sole's bottom")
+    lateral, path = _lateral(stance, postures, clock, "iCub")
+    at_sole, _ = _lateral(lowered, postures, clock, "iCub, sole's bottom")
+    within = _within_limits(stance, path, clock)
     with clock.stage("unit of length"):
         unit = _unit_of_length(stance)
     with clock.stage("claims"):
@@ -158,6 +184,7 @@ def reproduce(*, postures: int = 141, progress: Progress | None = None) -> Repro
         lateral=lateral,
         lateral_at_sole=at_sole,
         unit_of_length=unit,
+        within_limits=within,
         four_bar_claims=claims,
         icub_claims=icub_claims,
         changed_at_sole=tuple(
@@ -195,7 +222,7 @@ class _Clock:
         self.seconds[name] = time.perf_counter() - started
 
 
-def _lateral(stance: Stance, postures: int, clock: _Clock, name: str) -> xr.Dataset:
+def _lateral(stance: Stance, postures: int, clock: _Clock, name: str) -> tuple[xr.Dataset, Path]:
     """The CoM from over the right foot to over the left, every criterion at every posture."""
     half = _distance(stance) / 2
     with clock.stage(f"{name}: postures", postures) as advance:
@@ -211,11 +238,34 @@ def _lateral(stance: Stance, postures: int, clock: _Clock, name: str) -> xr.Data
     rolls = [robot.joint_position(s.q, HIP_ROLL) for s in path.stances]
     hip = {"units": "rad", "long_name": "position of the left hip roll joint"}
     rate = {"units": "rad/m", "long_name": "d left hip roll / d com_y along the path"}
-    return (
+    told = (
         dataset.assign_coords({HIP_ROLL: ("posture", rolls, hip)})
         .assign({f"{HIP_ROLL}_rate": ("posture", path.joint_rates(HIP_ROLL), rate)})
         .assign_attrs(_facts(stance, criteria[0]))
     )
+    return told, path
+
+
+def _within_limits(stance: Stance, path: Path, clock: _Clock) -> WithinLimits:
+    criteria = [minimum_wrench(_PAPER_LENGTH, name=WRENCH), minimum_torque(name=TORQUE)]
+    with clock.stage("limits: sensitivities", len(path)) as advance:
+        dataset = sweep(path, criteria, LIMITS, progress=advance)
+    with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
+        bindings = []
+        for criterion in criteria:
+            for side in (-1, 1):
+                found = first_binding(stance, criterion, LIMITS, side)
+                if found:
+                    bindings.append(found)
+                advance(1)
+        regions = {
+            "friction and soles": com_region(stance, replace(LIMITS, torque=None)),
+            "and torque limits": com_region(stance, LIMITS),
+        }
+        advance(2)
+        for criterion in criteria:
+            regions[criterion.name] = criterion_region(stance, criterion, LIMITS)
+    return WithinLimits(LIMITS, dataset, tuple(bindings), regions)
 
 
 def _facts(stance: Stance, criterion: Criterion) -> dict[str, float]:

@@ -17,6 +17,9 @@ from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
 
+# Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
+_BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -41,6 +44,17 @@ class Robot:
                 f"robot {self.name!r} has no floating base (its first joint is {root}). Build the "
                 "pin.Model with pin.JointModelFreeFlyer() as root joint, load it from its URDF, or "
                 "put a <freejoint/> in its MJCF."
+            )
+        bent = [
+            name
+            for name, joint in zip(model.names, model.joints, strict=True)
+            if any(kind in joint.shortname() for kind in _BENT)
+        ]
+        if bent:
+            raise InvalidInputError(
+                f"robot {self.name!r} has joints whose axes turn with their own angles "
+                f"({', '.join(bent)}), of which no exact derivative is known here. Make each a "
+                "chain of joints with one axis."
             )
         masses = np.array([body.mass for body in model.inertias])
         if not np.all(np.isfinite(masses)) or np.any(masses < 0) or masses.sum() <= 0:

@@ -10,16 +10,19 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
-from copsense.cop import contact_cops, half_planes
+from copsense.contact import half_planes
+from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.equilibrium import (
     PROJECT,
+    ConstrainedEquilibrium,
     StaticEquilibrium,
     WrenchLaw,
     is_admissible,
     solve_equilibrium,
 )
 from copsense.errors import InvalidInputError, SensitivityMismatchError
+from copsense.limits import Limits
 from copsense.posture import retract
 from copsense.stance import Stance
 
@@ -77,6 +80,25 @@ class CopSensitivity:
                 "respect to it. Choose a coordinate that moves, or another path."
             )
         return self.gradient @ t / rate
+
+    def one_sided(
+        self, tangent: ArrayLike, rate: float = 1.0
+    ) -> tuple[Float[np.ndarray, "nc 2"], Float[np.ndarray, "nc 2"]]:
+        """d cop / d coordinate before and after this point of a path (left, right).
+
+        They differ where a limit is touched without pressing; elsewhere both are `along`.
+        """
+        both = self.along(tangent, rate)
+        equilibrium, t = self.equilibrium, np.asarray(tangent, dtype=float)
+        if not isinstance(equilibrium, ConstrainedEquilibrium):
+            return both, both
+        forward = t if rate > 0 else -t
+        sides = []
+        for sign in (-1.0, 1.0):
+            forces = equilibrium.rates(sign * forward).forces
+            wrenches = equilibrium.stance.unstack(forces)
+            sides.append(sign * _cop_rate(equilibrium, self.cop, wrenches) / abs(rate))
+        return sides[0], sides[1]
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint [m/rad] along a path with this tangent."""
@@ -173,7 +195,11 @@ class CopSensitivity:
 
 
 def cop_sensitivity(
-    stance: Stance, criterion: Criterion | WrenchLaw, *, step: float = _STEP
+    stance: Stance,
+    criterion: Criterion | WrenchLaw,
+    limits: Limits | None = None,
+    *,
+    step: float = _STEP,
 ) -> CopSensitivity:
     """The sensitivity of every contact's centre of pressure along the admissible motions.
 
@@ -183,6 +209,9 @@ def cop_sensitivity(
     Args:
         stance: robot, configuration and contacts.
         criterion: a `Criterion`, or a callable q -> wrenches (nc, 6) in contact axes.
+        limits: what the wrenches and torques must respect; None for nothing. The matrices are then
+            those with the pressing limits held; where a limit is only touched the two sides
+            differ, see `CopSensitivity.one_sided`.
         step: displacement of the differences [rad, m]; a criterion takes none.
 
     Raises:
@@ -191,14 +220,18 @@ def cop_sensitivity(
     """
     if not isinstance(criterion, Criterion):
         return finite_difference_sensitivity(stance, criterion, step=step)
-    equilibrium = solve_equilibrium(stance, criterion)
+    equilibrium = solve_equilibrium(stance, criterion, limits)
     Z = stance.admissible_motions
     forces, torques = equilibrium.derivative(Z)
     return _sensitivity(equilibrium, Z, stance.unstack(forces), torques)
 
 
 def finite_difference_sensitivity(
-    stance: Stance, criterion: Criterion | WrenchLaw, *, step: float = _STEP
+    stance: Stance,
+    criterion: Criterion | WrenchLaw,
+    limits: Limits | None = None,
+    *,
+    step: float = _STEP,
 ) -> CopSensitivity:
     """The same sensitivity from equilibria alone: (8 (g(h) - g(-h)) - (g(2h) - g(-2h))) / 12h.
 
@@ -210,7 +243,8 @@ def finite_difference_sensitivity(
     wrenches, torques = [], []
     for z in Z.T:
         at = {
-            s: solve_equilibrium(retract(stance, s * step * z), criterion) for s in (-2, -1, 1, 2)
+            s: solve_equilibrium(retract(stance, s * step * z), criterion, limits)
+            for s in (-2, -1, 1, 2)
         }
         wrenches.append(
             (8 * (at[1].wrenches - at[-1].wrenches) - (at[2].wrenches - at[-2].wrenches))
@@ -219,18 +253,24 @@ def finite_difference_sensitivity(
         torques.append(
             (8 * (at[1].torques - at[-1].torques) - (at[2].torques - at[-2].torques)) / (12 * step)
         )
-    equilibrium = solve_equilibrium(stance, criterion)
+    equilibrium = solve_equilibrium(stance, criterion, limits)
     return _sensitivity(equilibrium, Z, np.stack(wrenches, -1), np.stack(torques, -1))
 
 
 def check_sensitivity(
-    stance: Stance, criterion: Criterion, *, tolerance: float = 1e-7, step: float = _STEP
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits | None = None,
+    *,
+    tolerance: float = 1e-7,
+    step: float = _STEP,
 ) -> None:
     """Compare the analytic sensitivity with finite differences at a stance.
 
     Args:
         stance: where to compare.
         criterion: the criterion to differentiate.
+        limits: what it must respect; the active ones must be the same at every difference.
         tolerance: largest difference allowed, relative to the largest entry of each.
         step: displacement of the differences [rad, m].
 
@@ -242,8 +282,8 @@ def check_sensitivity(
         raise InvalidInputError(
             "a law is differentiated numerically: there is nothing to compare. Give a Criterion."
         )
-    exact = cop_sensitivity(stance, criterion)
-    numeric = finite_difference_sensitivity(stance, criterion, step=step)
+    exact = cop_sensitivity(stance, criterion, limits)
+    numeric = finite_difference_sensitivity(stance, criterion, limits, step=step)
     pairs = {
         "centre of pressure": (exact.raw, numeric.raw),
         "wrench": (exact.wrench_derivative, numeric.wrench_derivative),
@@ -266,9 +306,18 @@ def _sensitivity(
     wrench_derivative: np.ndarray,
     torque_derivative: np.ndarray,
 ) -> CopSensitivity:
+    p = contact_cops(equilibrium)
+    raw = _cop_rate(equilibrium, p, wrench_derivative)
+    return CopSensitivity(equilibrium, basis, p, raw, wrench_derivative, torque_derivative)
+
+
+def _cop_rate(
+    equilibrium: StaticEquilibrium,
+    cop: Float[np.ndarray, "nc 2"],
+    change: Float[np.ndarray, "nc 6 *p"],
+) -> Float[np.ndarray, "nc 2 *p"]:
     """Quotient rule: dp = (d(-m_y, m_x) - p df_z) / f_z."""
-    p, dw = contact_cops(equilibrium), wrench_derivative
-    moments = np.stack([-dw[:, 4], dw[:, 3]], axis=1)
-    normal = equilibrium.wrenches[:, 2]
-    raw = (moments - p[:, :, None] * dw[:, None, 2]) / normal[:, None, None]
-    return CopSensitivity(equilibrium, basis, p, raw, dw, torque_derivative)
+    trailing = (1,) * (change.ndim - 2)
+    moments = np.stack([-change[:, 4], change[:, 3]], axis=1)
+    normal = equilibrium.wrenches[:, 2].reshape(-1, 1, *trailing)
+    return (moments - cop.reshape(*cop.shape, *trailing) * change[:, None, 2]) / normal

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -35,7 +35,7 @@ class Stance:
     Attributes:
         robot: the robot.
         q: configuration (nq,): base position, quaternion (x, y, z, w), joints.
-        contacts: the contacts, at least one.
+        contacts: the contacts, at least one; kept as a tuple.
         check: False skips the checks of where the contacts lie and of what they can carry, for
             a solver's intermediate steps.
 
@@ -48,7 +48,7 @@ class Stance:
 
     robot: Robot
     q: Float[np.ndarray, " nq"]
-    contacts: tuple[Contact, ...]
+    contacts: Sequence[Contact]
     check: InitVar[bool] = True
     _data: pin.Data = field(init=False, repr=False)
 
@@ -216,6 +216,14 @@ class Stance:
         for k, (contact, rows) in enumerate(zip(self.contacts, self.rows, strict=True)):
             wrenches[k, list(contact.components)] = forces[rows]
         return wrenches
+
+    def in_world_axes(self, wrenches: Float[np.ndarray, "nc 6"]) -> Float[np.ndarray, "nc 6"]:
+        """Wrenches given in contact axes, in world axes about the same points."""
+        turned = [
+            np.concatenate([place.rotation @ w[:3], place.rotation @ w[3:]])
+            for place, w in zip(self.placements, wrenches, strict=True)
+        ]
+        return np.array(turned)
 
     def joint_wrenches(self, forces: Float[np.ndarray, " m"]) -> list[pin.Force]:
         """Stacked forces as one spatial force per joint of the model, in the joint's frame."""

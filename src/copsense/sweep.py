@@ -13,8 +13,9 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
 from copsense.cop import edge_margin
 from copsense.criterion import Criterion
-from copsense.equilibrium import WrenchLaw, law_name
+from copsense.equilibrium import ConstrainedEquilibrium, WrenchLaw, law_name
 from copsense.errors import CopsenseError, InvalidInputError
+from copsense.limits import Limits
 from copsense.motion import Path
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance
@@ -66,6 +67,7 @@ _PER_CRITERION: dict[str, tuple[tuple[str, ...], str, str]] = {
 def sweep(
     path: Path,
     criteria: Sequence[Criterion | WrenchLaw],
+    limits: Limits | None = None,
     *,
     progress: Callable[[int], object] | None = None,
 ) -> xr.Dataset:
@@ -74,6 +76,8 @@ def sweep(
     Args:
         path: the postures and their tangents.
         criteria: criteria with distinct names, or laws q -> wrenches (named by their function).
+        limits: what the wrenches and torques must respect; None for nothing. The active ones of
+            each row are then named in ``active_limits``, separated by semicolons.
         progress: called with 1 after each posture.
 
     Returns:
@@ -102,13 +106,16 @@ def sweep(
     side = np.full((*shape, sizes["contact"]), "", dtype=object)
     pulling = np.zeros((*shape, sizes["contact"]), dtype=bool)
     reason = np.full(shape, "", dtype=object)
+    active = np.full(shape, "", dtype=object)
     for i, here in enumerate(path.stances):
         for j, criterion in enumerate(criteria):
             if i in path.failures:
                 reason[i, j] = path.failures[i]
                 continue
             try:
-                row = cop_sensitivity(here, criterion)
+                row = cop_sensitivity(here, criterion, limits)
+                if isinstance(row.equilibrium, ConstrainedEquilibrium):
+                    active[i, j] = "; ".join(limit.name for limit in row.equilibrium.active)
                 for name, value in _row(row, path.tangents[i]).items():
                     values[name][i, j] = value
                 pulling[i, j] = [c in row.equilibrium.pulling for c in here.contact_names]
@@ -119,7 +126,12 @@ def sweep(
                 reason[i, j] = str(error)
         if progress:
             progress(1)
-    return _dataset(path, names, values, side, pulling, reason)
+    dataset = _dataset(path, names, values, side, pulling, reason)
+    if limits is not None:
+        meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
+        dataset["active_limits"] = (("posture", "criterion"), active.astype(str), meaning)
+        dataset.attrs["limits"] = repr(limits)
+    return dataset
 
 
 def failed_rows(dataset: xr.Dataset) -> list[tuple[int, str, str]]:
@@ -261,6 +273,9 @@ def _dataset(
         "coordinate": coordinate,
         "contact_frames": ", ".join(c.frame for c in stance.contacts),
         "contact_kinds": ", ".join(c.kind for c in stance.contacts),
+        "without_sole": ", ".join(
+            c.name for c in stance.contacts if c.kind != "point" and c.polygon is None
+        ),
         "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
         "the robot, force first; base velocity in the base's frame",
     }

@@ -177,6 +177,8 @@ def test_every_error_is_of_one_family_and_survives_copies():
         errors.MissingExtraError("icub-models", "icub", "robot 'icub'"),
         errors.UnloadedContactError(("l_sole",)),
         errors.UndeterminedWrenchError("open", ("l_sole fz",)),
+        errors.InfeasibleError(3.0, ("l_sole: normal force",)),
+        errors.UnsolvedError(1e-3),
         *(
             e("said")
             for e in family
@@ -186,6 +188,8 @@ def test_every_error_is_of_one_family_and_survives_copies():
                 errors.MissingExtraError,
                 errors.UnloadedContactError,
                 errors.UndeterminedWrenchError,
+                errors.InfeasibleError,
+                errors.UnsolvedError,
             }
         ),
     ]

@@ -44,7 +44,7 @@ from copsense.storage import load_configurations
         ("analyse icub --plot absent/icub.png", "Create it first"),
         ("analyse icub --plot icub.bmp", "Choose .png or .svg or .pdf"),
         ("analyse four_bar --base-yaw 10", "lives in a plane"),
-        ("analyse four_bar --com-x 0.1", "CoM x remains"),
+        ("analyse four_bar --com-x 0.1", "CoM's x remains"),
         ("analyse solo12 --sole 0:1:0:1", "every contact is a point"),
         ("four-bar --xi nan", "xi must be a finite angle"),
         ("four-bar --xi 0", "collapsed"),

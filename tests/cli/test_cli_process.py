@@ -71,6 +71,8 @@ def test_a_broken_urdf_is_one_line_without_a_parser_s_chatter(tmp_path):
 def test_ctrl_c_in_the_middle_of_a_sweep_leaves_no_file(tmp_path):
     code = (
         "import importlib, itertools, signal\n"
+        # A job in the background of a script is born deaf to it.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "module = importlib.import_module('copsense.sweep')\n"
         "real, count = module.cop_sensitivity, itertools.count()\n"
         "def interrupted(*args):\n"

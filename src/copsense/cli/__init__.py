@@ -10,9 +10,11 @@ import warnings
 from typing import Any
 
 import click
+from threadpoolctl import threadpool_limits
 
 from copsense._version import __version__
 from copsense.cli.analyse import analyse
+from copsense.cli.design import design
 from copsense.cli.four_bar import four_bar
 from copsense.cli.reproduce import reproduce
 from copsense.cli.robots import robots
@@ -33,7 +35,7 @@ def copsense() -> None:
     """
 
 
-for _command in (robots, four_bar, analyse, sweep, plot, reproduce):
+for _command in (robots, four_bar, analyse, sweep, plot, design, reproduce):
     copsense.add_command(_command)
 
 
@@ -46,8 +48,6 @@ def main() -> None:
         sys.exit(code)
     except CopsenseError as error:
         click.echo(f"error: {error}", err=True)
-    except click.UsageError as error:
-        error.show()
     except click.ClickException as error:
         error.show()
     except (click.Abort, KeyboardInterrupt):
@@ -64,7 +64,9 @@ def main() -> None:
 
 def _run() -> int:
     try:
-        return copsense.main(standalone_mode=False) or 0
+        # The matrices are small: more BLAS threads than one cost more than they bring.
+        with threadpool_limits(limits=1, user_api="blas"):
+            return copsense.main(standalone_mode=False) or 0
     except SystemExit:
         return 0  # click leaves so when whoever read our output has seen enough
 

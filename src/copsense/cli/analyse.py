@@ -8,14 +8,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.options import (
+    criterion_options,
     echo_json,
     read_assignments,
     read_criteria,
+    read_limits,
     read_stance,
     stance_options,
 )
 
 if TYPE_CHECKING:
+    from copsense.criterion import Criterion
+    from copsense.limits import Limits
     from copsense.sensitivity import CopSensitivity
     from copsense.stance import Stance
 
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
     epilog="Example: copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png"
 )
 @stance_options
+@criterion_options
 @click.option("--com-x", type=float, metavar="M", help="World x of the CoM; default held.")
 @click.option("--com-y", type=float, metavar="M", help="World y of the CoM; default the middle.")
 @click.option(
@@ -42,6 +47,7 @@ def analyse(
     robot: str,
     criteria: tuple[str, ...],
     characteristic_length: float,
+    limits: str | None,
     com_x: float | None,
     com_y: float | None,
     joints: tuple[str, ...],
@@ -74,12 +80,15 @@ def analyse(
     y = com_y if com_y is not None else float(home.com[1])
     posture = solve_posture(home, com=(x, y, None), joints=held)
     stance, tangent = posture.stance, posture.tangents[:, 0 if planar else 1]
-    results = {c.name: cop_sensitivity(stance, c) for c in chosen}
+    within = read_limits(limits)
+    results = {c.name: cop_sensitivity(stance, c, within) for c in chosen}
     if check:
         for criterion in chosen:
-            check_sensitivity(stance, criterion)
+            check_sensitivity(stance, criterion, within)
     answer = _answer(stance, results, tangent, along)
-    answer["notes"] = list(sole_notes(stance))
+    if within is not None:
+        _add_limits(answer, stance, chosen, results, within)
+    answer.setdefault("notes", []).extend(sole_notes(stance))
     answer["notes"] += [
         f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
         for joint, excess in zip(
@@ -150,6 +159,87 @@ def _answer(
     }
 
 
+def _add_limits(
+    answer: dict[str, Any],
+    stance: Stance,
+    criteria: list[Criterion],
+    results: dict[str, CopSensitivity],
+    limits: Limits,
+) -> None:
+    """Active limits, margins, and the CoM's travel to each limit on both sides."""
+    from dataclasses import asdict
+
+    from copsense.equilibrium import ConstrainedEquilibrium
+    from copsense.limits import torque_placeholders
+    from copsense.margins import limit_margins, limit_travel
+
+    if limits.torque == "model" and torque_placeholders(stance):
+        answer.setdefault("notes", []).append(
+            "no torque limit in the model (a placeholder) for: "
+            + ", ".join(torque_placeholders(stance))
+        )
+    for criterion in criteria:
+        row, equilibrium = answer["criteria"][criterion.name], results[criterion.name].equilibrium
+        assert isinstance(equilibrium, ConstrainedEquilibrium)
+        row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
+        row["optimality"] = equilibrium.optimality()
+        row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
+        row["limit_travel"] = {
+            f"{'+' if side > 0 else '-'}y": [
+                {
+                    "name": t.margin.name,
+                    "margin": t.margin.value,
+                    "unit": t.margin.unit,
+                    "first_order": t.first_order,
+                    "exact": t.exact,
+                }
+                for t in limit_travel(stance, criterion, limits, side).limits
+            ]
+            for side in (1, -1)
+        }
+
+
+def _limit_verdict(answer: dict[str, Any]) -> str:
+    """The same of the first limit met to either side, found along the path."""
+    reach = {
+        name: min(
+            (math.inf if t["exact"] is None else t["exact"], t["name"])
+            for travels in row["limit_travel"].values()
+            for t in travels
+        )
+        for name, row in answer["criteria"].items()
+    }
+    best = max(reach, key=lambda name: reach[name][0])
+    distance, limit = reach[best]
+    if distance == 0:
+        return "Every criterion meets a limit here already."
+    if not math.isfinite(distance):
+        return f"{best} meets no limit within reach."
+    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n != best)
+    return (
+        f"{best} is the last to meet a limit: the CoM may move {distance * 1e3:.1f} mm until "
+        f"{limit}" + (f" ({others})." if others else ".")
+    )
+
+
+def _print_limits(row: dict[str, Any]) -> None:
+    names = "; ".join(
+        limit["name"] + ("" if limit["multiplier"] else " (touched)")
+        for limit in row["active_limits"]
+    )
+    click.echo(f"  active limits: {names or 'none'}")
+    for side, travels in row["limit_travel"].items():
+        for travel in travels[:3]:
+            if travel["exact"] is None:
+                continue
+            first = travel["first_order"]
+            predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
+            click.echo(
+                f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
+                f"(first order: {predicted})"
+            )
+
+
 def _print(answer: dict[str, Any], along: str | None) -> None:
     com = ", ".join(f"{round(value, 4) + 0.0:+.4f}" for value in answer["com"])
     click.echo(f"{answer['robot']}: {answer['mass']:.2f} kg, CoM ({com}) m, world axes")
@@ -181,6 +271,8 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
             if along:
                 line += f"  {c[f'cop_per_{along}'][1] * 1e3 * math.pi / 180:12.3f}"
             click.echo(line + ("  PULLING" if c["pulling"] else ""))
+        if "limit_travel" in row:
+            _print_limits(row)
     click.echo("\n" + _verdict(answer))
     for note in answer["notes"]:
         click.echo(f"note: {note}", err=True)
@@ -192,6 +284,8 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
 
 def _verdict(answer: dict[str, Any]) -> str:
     """One sentence: which criterion lets the CoM travel farthest before a contact tips."""
+    if all("limit_travel" in row for row in answer["criteria"].values()):
+        return _limit_verdict(answer)
     reach = {
         name: min(
             (c[key], f"{contact} {word}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -16,13 +16,14 @@ from copsense.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from copsense.contact import Contact
     from copsense.criterion import Criterion
+    from copsense.limits import Limits
     from copsense.stance import Stance
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def stance_options(command: F) -> F:
-    """The robot and how it stands."""
+    """The robot, how it stands, and what it must respect."""
     options = [
         click.argument("robot"),
         click.option(
@@ -72,6 +73,21 @@ def stance_options(command: F) -> F:
         ),
         click.option("--width", type=float, metavar="M", help="Distance between two feet [m]."),
         click.option(
+            "--limits",
+            metavar="NAME=VALUE,...",
+            help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+            "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+            "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+            "friction); off switches one off. Example: friction=0.33,torque=model.",
+        ),
+    ]
+    return _with(options, command)
+
+
+def criterion_options(command: F) -> F:
+    """Which criteria share the load."""
+    options = [
+        click.option(
             "--criterion",
             "criteria",
             multiple=True,
@@ -88,6 +104,10 @@ def stance_options(command: F) -> F:
             help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
         ),
     ]
+    return _with(options, command)
+
+
+def _with(options: Sequence[Callable[[Any], Any]], command: F) -> F:
     for option in reversed(options):
         command = option(command)
     return command
@@ -107,6 +127,12 @@ def read_stance(
     """The stance that the options of `stance_options` describe."""
     from copsense.robots import PRESETS, load_robot, load_stance
 
+    if sole_height is not None:
+        if contact_at == "sole":
+            raise InvalidInputError(
+                "--sole-height and --contact-at sole both say where the contacts are. Give one."
+            )
+        contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
     source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
     angles = {joint: math.radians(deg) for joint, deg in read_assignments(posture).items()}
@@ -201,6 +227,46 @@ def read_range(text: str) -> tuple[float, float, int]:
     except ValueError:
         raise InvalidInputError(
             f"the range {text!r} is not understood. Give START:STOP:COUNT, such as -0.07:0.07:201."
+        ) from None
+
+
+def read_limits(text: str | None) -> Limits | None:
+    """The limits that ``--limits`` describes, or None."""
+    from copsense.limits import Limits
+
+    if text is None:
+        return None
+    names = {
+        "normal-force": "normal_force",
+        "friction": "friction",
+        "sides": "friction_sides",
+        "cop-margin": "cop_margin",
+        "torsion": "torsion",
+        "torque": "torque",
+    }
+    values: dict[str, Any] = {}
+    for part in filter(None, text.split(",")):
+        name, _, value = part.partition("=")
+        if name not in names:
+            raise UnknownNameError("limit", name, names)
+        values[names[name]] = _limit_value(name, value)
+    return Limits(**values)
+
+
+def _limit_value(name: str, value: str) -> float | int | str | None:
+    if value == "off":
+        return None
+    if value in {
+        "friction": ("contact",),
+        "torsion": ("contact", "cone"),
+        "torque": ("model",),
+    }.get(name, ()):
+        return value
+    try:
+        return int(value) if name == "sides" else float(value)
+    except ValueError:
+        raise InvalidInputError(
+            f"the limit {name}={value!r} is no number. Write, say, {name}=8 or {name}=off."
         ) from None
 
 

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.options import (
+    criterion_options,
     echo_json,
     progress_bar,
     read_criteria,
+    read_limits,
     read_range,
     read_stance,
     stance_options,
@@ -32,6 +34,7 @@ _OVER_LIMIT = 1e-6  # rad: less is rounding
     "--criterion minimum-torque --output icub.nc"
 )
 @stance_options
+@criterion_options
 @click.option(
     "--com-y",
     metavar="START:STOP:COUNT",
@@ -55,6 +58,7 @@ def sweep(
     robot: str,
     criteria: tuple[str, ...],
     characteristic_length: float,
+    limits: str | None,
     com_y: str | None,
     joint: str | None,
     configurations: str | None,
@@ -80,9 +84,10 @@ def sweep(
     if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
+    within = read_limits(limits)
     path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
-        dataset = evaluate(path, chosen, progress=update)
+        dataset = evaluate(path, chosen, within, progress=update)
     dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
     failures = failed_rows(dataset)
     if output is not None:
@@ -136,7 +141,7 @@ def _read_path(
 
     if configurations is not None:
         rows = load_configurations(configurations)
-        return path_through(stance.at(rows[0]), rows)
+        return path_through(stance.at(rows[0]), rows, strict=False)
     name, _, text = ("", "", com_y) if com_y is not None else str(joint).partition("=")
     start, stop, count = read_range(text)
     with progress_bar(max(count, 0), "postures") as update:
@@ -154,7 +159,10 @@ def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str,
     criteria = {}
     for name in dataset["criterion"].values:
         here = dataset.sel(criterion=name)
-        planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
+        if "active_limits" in dataset:
+            planted = (here["active_limits"] == "").values & (here["reason"] == "").values
+        else:
+            planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
         run = _longest_run(planted)
         criteria[str(name)] = {
             "planted": sorted(float(values[i]) for i in run) if run else None,
@@ -169,6 +177,8 @@ def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str,
         "failed_rows": len(failures),
         "output": output,
         "criteria": criteria,
+        "limits": dataset.attrs.get("limits"),
+        "without_sole": dataset.attrs["without_sole"],
     }
 
 
@@ -191,13 +201,22 @@ def _print(summary: dict[str, Any]) -> None:
         unit, factor = "deg", 180.0 / math.pi
     click.echo(f"{summary['robot']}: {summary['postures']} postures along {summary['coordinate']}")
     for name, row in summary["criteria"].items():
+        word = "no limit active" if summary["limits"] else "every contact planted"
+        if summary["without_sole"] and not summary["limits"]:
+            word = "every contact pushes"
         if row["planted"] is None:
-            planted = "no posture keeps every contact planted"
+            planted = f"{word} at no posture"
         else:
             low, high = (value * factor for value in row["planted"])
-            planted = f"every contact planted from {low:+.4g} to {high:+.4g} {unit}"
+            planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
         if math.isfinite(row["smallest_margin"]):
             planted += f"; smallest margin on the way {row['smallest_margin'] * 1e3:+.1f} mm"
         click.echo(f"  {name}: {planted}")
+    if summary["without_sole"]:
+        click.echo(
+            f"note: no sole is known under {summary['without_sole']}, so when it tips is not "
+            "either: give --sole X0:X1:Y0:Y1.",
+            err=True,
+        )
     if summary["output"]:
         click.echo(f"written: {summary['output']}")

@@ -14,6 +14,7 @@ from copsense.plots.curves import (
     plot_torques,
     plot_travel,
 )
+from copsense.plots.limits import plot_limited, plot_regions
 from copsense.plots.paper import (
     plot_criteria_curves,
     plot_figure_3,
@@ -33,8 +34,10 @@ __all__ = [
     "plot_figure_9a",
     "plot_figure_9b",
     "plot_foot_cop",
+    "plot_limited",
     "plot_load",
     "plot_margin",
+    "plot_regions",
     "plot_results",
     "plot_sensitivity",
     "plot_soles",

@@ -58,7 +58,10 @@ def plot_travel(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = T
     mark_failed(ax, dataset, colour)
     _keep_readable(ax, colour, travel)
     shade_below_zero(ax, travel, "a contact tips or pulls")
-    if not np.any(np.isfinite(travel)):
+    blind = str(dataset.attrs.get("without_sole", ""))
+    if blind:
+        say(ax, f"no sole known under {blind}:\nthe travel to unloading, not to tipping")
+    elif not np.any(np.isfinite(travel)):
         say(ax, "no contact tips or unloads, to first order")
     ax.set_xlabel(x.label)
     ax.set_ylabel("CoM travel left [mm]")

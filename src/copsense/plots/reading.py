@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
 
+ON_EDGE = 1e-9  # m: a CoP this near to its edge is on it
 MM, DEG = 1e3, 180.0 / np.pi
 _AXES = {"x": 0, "y": 1}
 
@@ -105,7 +106,8 @@ def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
 
 def planted(dataset: xr.Dataset) -> Bool[np.ndarray, "N criterion contact"]:
     """Where a contact pushes and its CoP is on its sole."""
-    return np.asarray((dataset["margin"].values > 0) & ~dataset["pulling"].values.astype(bool))
+    on = dataset["margin"].values > -ON_EDGE  # a limit may hold it on the very edge
+    return np.asarray(on & ~dataset["pulling"].values.astype(bool))
 
 
 def first_to_go(dataset: xr.Dataset) -> Float[np.ndarray, "N criterion"]:

@@ -15,7 +15,9 @@ from copsense.plots import (
     plot_figure_3,
     plot_figure_9a,
     plot_figure_9b,
+    plot_limited,
     plot_load,
+    plot_regions,
     plot_results,
     plot_sensitivity,
     plot_soles,
@@ -59,6 +61,7 @@ def report_figures(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
         *_four_bar(reproduction),
         *_icub(reproduction),
         *_beyond(reproduction),
+        *_limits(reproduction),
     )
 
 
@@ -278,6 +281,46 @@ def _beyond(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "bars, for both criteria.",
             lambda: plot_torques(both),
             shape="wide",
+        ),
+    )
+
+
+def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
+    within = reproduction.within_limits
+    binding: dict[str, list[float]] = {}
+    for found in within.bindings:
+        binding.setdefault(found.criterion, []).append(found.com_y)
+    first = {name: min(abs(y) for y in ys) * 1e3 for name, ys in binding.items()}
+    said = " and ".join(f"{mm:.1f} mm under {name}" for name, mm in first.items())
+    areas = {name: region.area * 1e4 for name, region in within.regions.items()}
+    return (
+        ReportFigure(
+            "limits",
+            "limits",
+            "Within limits, iCub.",
+            f"The first limit binds at a CoM travel of {said}: there the CoP stops at the sole's "
+            "edge (left), its slope falls to nearly zero and the other foot's jumps up (right; "
+            "verticals where the first limit binds), because it has to carry what the first no "
+            "longer can.",
+            "CoP y of both feet against CoM y, flat at the soles' edges; slopes with jumps where "
+            "the limits bind.",
+            lambda: plot_limited(within.lateral, binding),
+            shape="wide",
+        ),
+        ReportFigure(
+            "regions",
+            "limits",
+            "Where the CoM may be, iCub.",
+            "Nested: where friction and soles allow an equilibrium ("
+            f"{areas['friction and soles']:.0f} cm²), where the motors do too "
+            f"({areas['and torque limits']:.0f} cm²), and where each criterion's own wrenches stay "
+            f"within the limits without being clipped ({areas[WRENCH]:.0f} cm² under minimum "
+            f"wrench, {areas[TORQUE]:.0f} cm² under minimum torque). The joints' posture is held "
+            "while the weight's line of action moves.",
+            "Nested polygons over the two soles from above: the widest for friction and soles, the "
+            "smallest for the criteria's own.",
+            lambda: _figure(plot_regions(within.regions, paper_criteria(reproduction))),
+            shape="alone",
         ),
     )
 

@@ -9,10 +9,11 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
 
+from copsense.binding import FirstBinding
 from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
 from copsense.report.figures import ReportFigure
 from copsense.report.typesetting import typeset
-from copsense.report.words import commands, differs, limits, summary
+from copsense.report.words import commands, differs, limit_words, limits, summary
 from copsense.reproduction import Reproduction
 
 _MARKS = {
@@ -70,6 +71,8 @@ def render_page(
         versions=reproduction.versions,
         timings={stage: f"{s:.2f} s" for stage, s in reproduction.timings.items()},
         limits=limits(reproduction),
+        limit_words=limit_words(reproduction.within_limits.limits),
+        bindings=[_binding(b) for b in reproduction.within_limits.bindings],
     )
 
 
@@ -82,6 +85,15 @@ def number(value: float, unit: str = "1") -> str:
     else:
         text = f"{value:.1e}" if abs(value) < 1e-4 else f"{value:.4g}"
     return text if unit == "1" else f"{text} {unit}"
+
+
+def _binding(found: FirstBinding) -> dict[str, str]:
+    sides = {
+        name: ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
+        for name, side in (("before", found.before), ("after", found.after))
+    }
+    where = f"{found.com_y * 1e3:+.2f} mm"
+    return {"criterion": found.criterion, "limit": found.limit, "com_y": where} | sides
 
 
 def _counts(claims: tuple[EvaluatedClaim, ...]) -> list[dict[str, object]]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections import Counter
 
+from copsense.limits import Limits
 from copsense.paper import EvaluatedErratum, Verdict
 from copsense.paper.lateral import SHORT, TORQUE, WRENCH
 from copsense.reproduction import Reproduction
 
+_LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 _ROUNDING = 1e-9  # differences below this are rounding
 
 
@@ -43,6 +45,16 @@ def summary(reproduction: Reproduction) -> tuple[str, ...]:
     )
 
 
+def limit_words(limits: Limits) -> str:
+    """Limits as a sentence's part."""
+    return (
+        f"normal force of each foot over {limits.normal_force:g} N, friction coefficient "
+        f"{limits.friction:.3g} (pyramid of {limits.friction_sides} sides), torsion "
+        f"{limits.torsion:.3g} m, CoP inside the sole, and the model's torque limits, which are "
+        "real for the legs only"
+    )
+
+
 def differs(evaluated: EvaluatedErratum) -> bool:
     """Whether a number shows that the print differs from what holds."""
     return evaluated.discrepancy is not None and evaluated.discrepancy.as_printed > _ROUNDING
@@ -61,8 +73,9 @@ def limits(reproduction: Reproduction) -> tuple[str, ...]:
         "of Section V are judged by whether they hold for the quasi-static motion they describe.",
         "The amplitude of the CoM's sine is not printed. The sweep goes from over one foot to over "
         "the other, as the text describes the motion.",
-        "No limits are enforced on the wrenches (Remark 4). Where a CoP leaves its sole, a "
-        "controller with such limits would keep it there and share the load differently.",
+        "Outside the section on limits none are enforced on the wrenches (Remark 4): where a CoP "
+        "leaves its sole, a controller with limits would keep it there and share the load "
+        "differently.",
         "The paper says neither which iCub nor which posture: iCubGenova04 in a two-feet posture "
         "of that time, which has the hip height and foot distance that the paper states, stands "
         "for it. Its sole frames lie above the bottom of its collision geometry; the reference "
@@ -98,6 +111,11 @@ def commands(reproduction: Reproduction, command: str) -> dict[str, tuple[str, .
             f"{sweep} --output icub.nc",
             "copsense plot icub.nc --output icub.png",
             f"{sweep} --contact-at sole --output icub_at_sole.nc",
+        ),
+        "limits": (
+            f"{sweep} --limits {_LIMITS} --output icub_within.nc",
+            f"copsense analyse icub --limits {_LIMITS}",
+            f"copsense design icub --family joints --limits {_LIMITS}",
         ),
         "beyond": (
             f"copsense sweep icub {span} --criterion minimum-wrench "

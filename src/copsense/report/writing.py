@@ -104,6 +104,7 @@ def _write_data(reproduction: Reproduction, folder: Path) -> None:
     write_results(reproduction.lateral, folder / "icub_lateral.nc")
     write_results(reproduction.lateral, folder / "icub_lateral.csv")
     write_results(reproduction.lateral_at_sole, folder / "icub_lateral_at_sole.nc")
+    write_results(reproduction.within_limits.lateral, folder / "icub_within_limits.nc")
     _write_json(
         folder / "claims.json",
         [

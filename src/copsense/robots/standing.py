@@ -82,7 +82,7 @@ def load_stance(
     """
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
-    preset = PRESETS.get(source) if isinstance(source, str) else None
+    preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
     robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
     if contacts is None:
         if preset is None:
@@ -96,12 +96,8 @@ def load_stance(
     elif isinstance(contacts, str):
         raise InvalidInputError(f"contacts is one name, {contacts!r}. Give a list, [{contacts!r}].")
     else:
-        chosen = tuple(Contact(c) if isinstance(c, str) else c for c in contacts)
-        preset_frames = {c.frame: c for c in preset.contacts} if preset else {}
-        chosen = tuple(
-            preset_frames.get(c, new) if isinstance(c, str) else new
-            for c, new in zip(contacts, chosen, strict=True)
-        )
+        known = {c.frame: c for c in preset.contacts} if preset else {}
+        chosen = tuple(_contact(c, known) for c in contacts)
     chosen = _complete(robot, chosen, preset, contact_at)
     angles = {j: float(np.radians(a)) for j, a in preset.posture.items()} if preset else {}
     q = robot.configuration(angles | dict(posture or {}))
@@ -199,26 +195,44 @@ def likely_feet(robot: Robot) -> tuple[str, ...]:
     return tuple(n for n in dict.fromkeys(robot.frame_names) if any(w in n.lower() for w in words))
 
 
+def _contact(given: object, known: Mapping[str, Contact]) -> Contact:
+    """A contact, or a frame's name as what the preset knows of it, else a surface contact."""
+    if isinstance(given, str):
+        return known.get(given) or Contact(given)
+    if not isinstance(given, Contact):
+        raise InvalidInputError(
+            f"{given!r} is no contact. Give a frame's name, or Contact(frame=...)."
+        )
+    return given
+
+
 def _complete(
     robot: Robot, contacts: tuple[Contact, ...], preset: Preset | None, at: ContactAt | None
 ) -> tuple[Contact, ...]:
-    """Fill in offsets and polygons from the collision geometry."""
-    mode = at or (preset.sole_from_geometry if preset else None)
+    """Fill in offsets and polygons from the collision geometry.
+
+    A contact that the caller placed himself stays where he put it, unless he asks for the sole.
+    """
+    mode = preset.sole_from_geometry if preset else None
+    known = {c.frame: c for c in preset.contacts} if preset else {}
     completed = []
     for contact in contacts:
-        needs = contact.kind == "surface" and (contact.polygon is None or at is not None)
-        if (
-            not needs
-            or (preset and mode is None)
-            or (not preset and robot.description is None and not at)
-        ):
+        own = known.get(contact.frame)
+        untouched = own is not None and (
+            contact.offset == own.offset and np.array_equal(contact.rotation, own.rotation)
+        )
+        lower = at == "sole" or (at is None and mode == "sole" and untouched)
+        outline = contact.polygon is None and (
+            at is not None or mode is not None or (not preset and robot.description is not None)
+        )
+        if contact.kind != "surface" or not (lower or outline):
             completed.append(contact)
             continue
         robot.frame(contact.frame)
         try:
             sole = read_sole(robot, contact)
         except ModelLoadError as error:
-            if mode == "sole":
+            if lower:
                 raise
             warnings.warn(
                 f"contact {contact.name!r} has no sole polygon, so no margin to its edge is known: "
@@ -229,7 +243,7 @@ def _complete(
             completed.append(contact)
             continue
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
-        if mode == "sole":
+        if lower:
             offset = offset + up * (sole.height - up @ offset)
         elif not preset and at is None and abs(sole.height - up @ offset) > _OFF_SOLE:
             away = abs(sole.height - up @ offset) * 1e3

@@ -1,0 +1,120 @@
+"""``copsense design``: the criterion that lets the CoM travel farthest."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.options import (
+    echo_json,
+    progress_bar,
+    read_limits,
+    read_range,
+    read_stance,
+    stance_options,
+)
+from copsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.design import Design, Score
+
+
+@click.command(
+    epilog="Example: copsense design icub --family joints --limits friction=0.33,torque=model"
+)
+@stance_options
+@click.option(
+    "--family",
+    default="joints",
+    show_default=True,
+    metavar="NAME",
+    help="What may be chosen: length (of minimum-wrench), joints (torque weights of hips, knees "
+    "and ankles) or mix (of minimum-torque with minimum-wrench).",
+)
+@click.option(
+    "--objective",
+    default="travel",
+    show_default=True,
+    metavar="NAME",
+    help="travel: the farthest CoM travel to the first limit; gain: the least |dCoP/dCoM|.",
+)
+@click.option(
+    "--com-y",
+    default="-0.09:0.09:37",
+    show_default=True,
+    metavar="START:STOP:COUNT",
+    help="The path: world y of the CoM [m], its middle being where the travel begins.",
+)
+@click.option(
+    "--grid", type=click.IntRange(min=2), default=7, show_default=True, help="Values a parameter."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, with the Pareto set.")
+def design(
+    robot: str,
+    limits: str | None,
+    family: str,
+    objective: Any,
+    com_y: str,
+    grid: int,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Design the weights of a criterion for ROBOT, and say what they gain over the paper's two.
+
+    The CoM is swept sideways from the posture; each candidate is judged by how far it goes before
+    its own wrenches, unclipped, meet a limit.
+    """
+    from copsense.design import design_criterion, families
+    from copsense.limits import Limits
+    from copsense.motion import lateral_sweep
+
+    within = read_limits(limits) or Limits()
+    start, stop, count = read_range(com_y)
+    stance = read_stance(robot, **options)
+    known = families(stance)
+    if family not in known:
+        raise UnknownNameError("family", family, known)
+    with progress_bar(count, "postures") as update:
+        path = lateral_sweep(stance, start, stop, count, progress=update)
+    with progress_bar(grid ** len(known[family].parameters), "candidates") as update:
+        found = design_criterion(
+            path, within, known[family], objective=objective, grid=grid, progress=update
+        )
+    if as_json:
+        echo_json(
+            {
+                "robot": stance.robot.name,
+                "family": family,
+                "objective": objective,
+                "best": asdict(found.score),
+                "baselines": [asdict(s) for s in found.baselines],
+                "pareto": [asdict(s) for s in found.pareto],
+            }
+        )
+    else:
+        _print(stance.robot.name, found)
+
+
+def _print(robot: str, found: Design) -> None:
+    click.echo(f"{robot}: family {found.family}, objective {found.objective}")
+    click.echo("criterion         travel [mm]  worst gain  torque norm [N m]  first limit")
+    for row in (*found.baselines, found.score):
+        click.echo(_line(row))
+    chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
+    more = (found.score.travel / max(s.travel for s in found.baselines) - 1) * 100
+    reach = found.score.range * 1e3
+    click.echo(f"\nbest: {chosen}; travel {more:+.0f} % over the better of the paper's two")
+    click.echo(f"gain and torque norm over postures within {reach:.1f} mm of the middle")
+    click.echo("\nPareto set (no other is better in both):")
+    for row in found.pareto:
+        chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
+        click.echo(_line(row) + f"  {chosen}")
+
+
+def _line(row: Score) -> str:
+    return (
+        f"{row.criterion:16}  {row.travel * 1e3:11.1f}  {row.worst_gain:10.3f}"
+        f"  {row.torque_norm:17.2f}  {row.first_limit}"
+    )

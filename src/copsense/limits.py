@@ -1,0 +1,348 @@
+"""Limits: what the ground and the motors allow, as rows a' f <= b on the stacked contact forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.optimize import linprog
+from scipy.spatial import ConvexHull, QhullError
+
+from copsense.contact import Contact, edge_side, half_planes
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.stance import Stance
+
+# Effort limits from here on are a modeller's "no limit", not a motor's.
+PLACEHOLDER_TORQUE = 1e4  # Nm
+_ROUNDING = 1e-9  # m
+_CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
+
+TorqueLimits = Literal["model"] | Mapping[str, float] | float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What contact wrenches and torques must respect; None switches a limit off.
+
+    Attributes:
+        normal_force: least normal force of every contact [N].
+        friction: Coulomb coefficient for contacts that give none of their own; ``"contact"`` takes
+            the contacts' own and leaves those without one unlimited; None switches friction off.
+        friction_sides: sides of the pyramid inscribed in the friction cone, at least 3.
+        cop_margin: how far inside the sole's edges the centre of pressure must stay [m].
+        torsion: torsional coefficient [m], ``|m_z| <= coefficient f_z``;
+            ``"contact"`` takes the contacts' own; ``"cone"`` the exact wrench cone of the sole
+            (moments that the sole's friction can carry, Caron et al. 2015), which contains the
+            friction and centre-of-pressure limits too; None switches it off.
+        torque: ``"model"`` for the model's effort limits, a number for every joint, or joint ->
+            limit [Nm]; None switches it off. Placeholders of the model (none, zero, or
+            `PLACEHOLDER_TORQUE` and more) are no limits: `torque_placeholders` names them.
+    """
+
+    normal_force: float | None = 0.0
+    friction: float | Literal["contact"] | None = "contact"
+    friction_sides: int = 8
+    cop_margin: float | None = 0.0
+    torsion: float | Literal["contact", "cone"] | None = "contact"
+    torque: TorqueLimits | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that limit nothing or everything."""
+        for name in ("normal_force", "friction", "cop_margin", "torsion"):
+            value = getattr(self, name)
+            if isinstance(value, str):
+                allowed = {"friction": ("contact",), "torsion": ("contact", "cone")}.get(name, ())
+                if value not in allowed:
+                    raise UnknownNameError(f"{name} limit", value, allowed)
+            elif value is not None and not (np.isfinite(value) and value >= 0):
+                raise InvalidInputError(
+                    f"limit {name} must be a non-negative number or None, got {value}."
+                )
+        if not (self.friction_sides >= 3 and self.friction_sides == int(self.friction_sides)):
+            raise InvalidInputError(
+                f"a friction pyramid has a whole number of sides, 3 or more; got "
+                f"{self.friction_sides}."
+            )
+        if isinstance(self.torque, str):
+            if self.torque != "model":
+                raise UnknownNameError("torque limit", self.torque, ("model",))
+        elif self.torque is not None:
+            given = (
+                self.torque if isinstance(self.torque, Mapping) else {"every joint": self.torque}
+            )
+            for joint, value in given.items():
+                if not float(value) >= 0:
+                    raise InvalidInputError(
+                        f"torque limits must be non-negative numbers [Nm], got {value} for {joint}."
+                    )
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is limited."""
+        return any(
+            v is not None
+            for v in (self.normal_force, self.friction, self.cop_margin, self.torsion, self.torque)
+        )
+
+
+NO_LIMITS = Limits(None, None, 8, None, None, None)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitRows:
+    """Limits at a stance. Contact rows are constant along a path, torque limits are not.
+
+    Attributes:
+        matrix: A (r, m) of the contact rows, A f <= bound, over stacked forces.
+        bound: (r,).
+        names: what each row limits, such as ``"l_sole: CoP at the +y edge"``.
+        contacts: index of the contact of each row (r,).
+        kinds: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"`` or ``"wrench cone"``.
+        torque: limit of the size of each joint's torque (n,) [Nm]; infinite where there is none.
+        joints: name of each of these joints (n,).
+    """
+
+    matrix: Float[np.ndarray, "r m"]
+    bound: Float[np.ndarray, " r"]
+    names: tuple[str, ...]
+    contacts: tuple[int, ...]
+    kinds: tuple[str, ...]
+    torque: Float[np.ndarray, " n"]
+    joints: tuple[str, ...]
+
+    @property
+    def joint(self) -> Int[np.ndarray, " k"]:
+        """Joint of each torque row (k,): two rows, s tau <= t, for each joint with a limit."""
+        return np.repeat(np.flatnonzero(np.isfinite(self.torque)), 2)
+
+    @property
+    def sign(self) -> Float[np.ndarray, " k"]:
+        """The sign s of each torque row (k,): +1, -1 in turn."""
+        return np.tile([1.0, -1.0], len(self.joint) // 2)
+
+    @property
+    def torque_names(self) -> tuple[str, ...]:
+        """What each torque row limits (k,)."""
+        return tuple(f"torque of {self.joints[i]}" for i in self.joint)
+
+    def over_forces(
+        self, stance: Stance
+    ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:
+        """A and b of A f <= b with the torque rows after the contacts': tau = G_j - J_j' f.
+
+        s tau_i <= t_i is the row -s J_i' f <= t_i - s G_i.
+        """
+        nb, joint, s = stance.robot.base_nv, self.joint, self.sign
+        Jj, Gj = stance.jacobian[:, nb:].T[joint], stance.gravity[nb:][joint]
+        A = np.vstack([self.matrix, -s[:, None] * Jj])
+        return A, np.concatenate([self.bound, self.torque[joint] - s * Gj])
+
+
+def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
+    """The rows of limits at a stance.
+
+    Raises:
+        InvalidInputError: a limit needs what a contact does not have (a sole, a coefficient), or a
+            sole is too narrow for its margin.
+        UnknownNameError: a torque limit names no joint.
+    """
+    matrix, bound, names, contacts, kinds = [], [], [], [], []
+    m = len(stance.component_index)
+    for k, (contact, rows) in enumerate(zip(stance.contacts, stance.rows, strict=True)):
+        for kind, name, normal, b in _contact_rows(contact, limits):
+            row = np.zeros(m)
+            row[rows] = normal[list(contact.components)]
+            matrix.append(row)
+            bound.append(b)
+            names.append(f"{contact.name}: {name}")
+            contacts.append(k)
+            kinds.append(kind)
+    return LimitRows(
+        np.array(matrix).reshape(-1, m),
+        np.array(bound, dtype=float),
+        tuple(names),
+        tuple(contacts),
+        tuple(kinds),
+        torque_limits(stance, limits.torque),
+        stance.robot.torque_names,
+    )
+
+
+def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
+    """Limit of the size of each joint's torque [Nm], infinite where there is none."""
+    names = stance.robot.torque_names
+    if limits is None:
+        return np.full(len(names), np.inf)
+    if isinstance(limits, str):
+        model = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :]
+        return np.where((model > 0) & (model < PLACEHOLDER_TORQUE), model, np.inf)
+    if isinstance(limits, Mapping):
+        for joint in limits:
+            if joint not in names:
+                raise UnknownNameError("joint in the torque limits", joint, names)
+        return np.array([float(limits.get(joint, np.inf)) for joint in names])
+    return np.full(len(names), float(limits))
+
+
+def torque_placeholders(stance: Stance) -> tuple[str, ...]:
+    """Joints whose effort limit in the model is a placeholder: none, zero, or absurdly large."""
+    limits = torque_limits(stance, "model")
+    return tuple(n for n, t in zip(stance.robot.torque_names, limits, strict=True) if np.isinf(t))
+
+
+Row = tuple[str, str, Float[np.ndarray, " 6"], float]
+
+
+def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
+    """Rows of one contact over its six components: kind, name, normal, bound."""
+    rows: list[Row] = []
+    if limits.normal_force is not None:
+        rows.append(("normal force", "normal force", _unit(2) * -1.0, -limits.normal_force))
+    mu = contact.friction
+    if limits.friction is None:
+        mu = None
+    elif mu is None and not isinstance(limits.friction, str):
+        mu = limits.friction
+    if mu is not None:
+        rows += _pyramid_rows(contact, mu, limits.friction_sides)
+    if limits.cop_margin is not None and contact.polygon is not None and contact.kind != "point":
+        _require_room(contact, contact.polygon, limits.cop_margin)
+        rows += _cop_rows(contact, contact.polygon, limits.cop_margin)
+    if limits.torsion == "cone" and contact.kind == "surface":
+        rows += _cone_rows(contact, mu, limits.friction_sides)
+    torsion = contact.torsional_friction
+    if limits.torsion is None or limits.torsion == "cone":
+        torsion = None
+    elif torsion is None and not isinstance(limits.torsion, str):
+        torsion = limits.torsion
+    if torsion is not None and contact.kind == "surface":
+        for sign, side in ((1.0, "left"), (-1.0, "right")):
+            row = sign * _unit(5) - torsion * _unit(2)
+            rows.append(("torsion", f"torsion to the {side}", row, 0.0))
+    return rows
+
+
+def _pyramid_rows(contact: Contact, mu: float, sides: int) -> list[Row]:
+    """The pyramid inscribed in |f_t| <= mu f_z, with a vertex along x."""
+    if contact.kind == "planar":
+        return [
+            ("friction", f"slips to {word}y", sign * _unit(1) - mu * _unit(2), 0.0)
+            for sign, word in ((1.0, "-"), (-1.0, "+"))
+        ]
+    rows: list[Row] = []
+    reach = mu * np.cos(np.pi / sides)
+    for i in range(sides):
+        angle = 2 * np.pi * (i + 0.5) / sides
+        row = np.cos(angle) * _unit(0) + np.sin(angle) * _unit(1) - reach * _unit(2)
+        rows.append(
+            ("friction", f"slips towards {np.degrees(angle + np.pi) % 360:.0f} deg", row, 0.0)
+        )
+    return rows
+
+
+def _cop_rows(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float) -> list[Row]:
+    """a . p <= b - margin for each edge, with p = (-m_y, m_x) / f_z and f_z >= 0."""
+    normals, offsets = half_planes(polygon)
+    if len(polygon) == 2 and contact.kind == "surface":
+        # A sole that is a line has two sides too, which leave no room across it.
+        across = np.array([[-normals[1, 1], normals[1, 0]], [normals[1, 1], -normals[1, 0]]])
+        offsets = np.concatenate([offsets - margin, across @ polygon[0]])
+        normals = np.vstack([normals, across])
+    else:
+        offsets = offsets - margin
+    return [
+        (
+            "cop",
+            f"CoP at the {edge_side(a)} edge",
+            np.array([0.0, 0.0, -b, a[1], -a[0], 0.0]),
+            0.0,
+        )
+        for a, b in zip(normals, offsets, strict=True)
+    ]
+
+
+def _require_room(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float) -> None:
+    """Refuse a sole without a point that far from its edges: it could carry no load at all."""
+    room = _room(tuple(map(tuple, polygon.tolist())), contact.kind == "planar")
+    if margin > room + _ROUNDING:
+        raise InvalidInputError(
+            f"the sole of {contact.name!r} has no point {margin:g} m inside its edges: the "
+            f"innermost one is {room:.3g} m inside. Give a smaller cop_margin."
+        )
+
+
+@cache
+def _room(polygon: tuple[tuple[float, float], ...], planar: bool) -> float:
+    """Largest distance to the nearest edge of a point of the sole (with x = 0 if planar) [m]."""
+    normals, offsets = half_planes(np.array(polygon))
+    found = linprog(
+        [0.0, 0.0, -1.0],
+        A_ub=np.column_stack([normals, np.ones(len(normals))]),
+        b_ub=offsets,
+        bounds=[(0.0, 0.0) if planar else (None, None), (None, None), (None, None)],
+    )
+    return -float(found.fun)
+
+
+def _cone_rows(contact: Contact, mu: float | None, sides: int) -> list[Row]:
+    """Faces of the cone of wrenches that friction forces at the sole's vertices can make up."""
+    if mu is None or contact.polygon is None or len(contact.polygon) < 3:
+        raise InvalidInputError(
+            f"the wrench cone of contact {contact.name!r} needs a friction coefficient and a sole "
+            "of three points or more. Give both, or another torsion limit."
+        )
+    if len(contact.polygon) > _CONE_VERTICES:
+        raise InvalidInputError(
+            f"the sole of {contact.name!r} has {len(contact.polygon)} vertices; its exact wrench "
+            f"cone is made for {_CONE_VERTICES} at most. Give a simpler polygon, such as "
+            "rectangle(...)."
+        )
+    faces = _unit_cone(tuple(map(tuple, contact.polygon.tolist())), mu, sides)
+    return [("wrench cone", f"wrench cone, face {i}", row, 0.0) for i, row in enumerate(faces)]
+
+
+@cache
+def _unit_cone(
+    polygon: tuple[tuple[float, float], ...], mu: float, sides: int
+) -> tuple[Float[np.ndarray, " 6"], ...]:
+    """Face normals of the wrench cone; each vertex pushes with f_z = 1 along the pyramid's edges.
+
+    Their section at f_z = 1 is a polytope over (fx, fy, mx, my, mz); a face of it,
+    n . w + offset <= 0, is a face n . w + offset f_z <= 0 of the cone (Caron et al. 2015).
+    """
+    if mu == 0:
+        raise InvalidInputError(
+            "without friction there is no wrench cone: use friction and CoP rows."
+        )
+    angles = 2 * np.pi * np.arange(sides) / sides
+    points = [
+        (fx := mu * np.cos(t), fy := mu * np.sin(t), y, -x, x * fy - y * fx)
+        for x, y in polygon
+        for t in angles
+    ]
+    array = np.array(points)
+    # Where Qhull takes little friction for a flat direction, each axis in its own size helps; where
+    # rounding has it merge facets of so regular a section wrongly, looking from elsewhere does.
+    own_size = np.diag(1.0 / np.abs(array).max(axis=0))
+    turns = np.random.default_rng(0).normal(size=(4, 5, 5))
+    for view in (np.eye(5), own_size, *(np.linalg.qr(turn)[0] @ own_size for turn in turns)):
+        try:
+            faces = np.unique(np.round(ConvexHull(array @ view.T).equations, 12), axis=0)
+        except QhullError:
+            continue
+        faces[:, :5] = faces[:, :5] @ view
+        faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
+        if (array @ faces[:, :5].T + faces[:, 5]).max() < _ROUNDING:
+            return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
+    raise InvalidInputError(
+        f"the wrench cone of so thin a sole (friction {mu:g}) could not be computed. Use friction, "
+        "CoP and torsion rows."
+    )
+
+
+def _unit(component: int) -> Float[np.ndarray, " 6"]:
+    return np.eye(6)[component]

@@ -1,0 +1,52 @@
+"""The base's balance by the position of the centre of mass, posture held."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.arrays import finite_array
+from copsense.stance import Stance
+
+_NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
+
+
+def gravity_at(stance: Stance, com: ArrayLike) -> Float[np.ndarray, " nv"]:
+    """Generalised gravity with the weight's line of action through another point, posture held.
+
+    Args:
+        stance: robot, posture and contacts.
+        com: (2,) world x, y [m] of the centre of mass.
+
+    Returns:
+        The vector G (nv,) in N and Nm. The base's rows, in the base's frame, are those of the
+        weight at `com`; the joints' rows are the stance's. It equals ``stance.gravity`` at
+        ``stance.com[:2]``.
+    """
+    point = finite_array(com, "the centre of mass", (2,), "world x, y [m]")
+    gravity = np.array(stance.gravity)
+    gravity[: stance.robot.base_nv] += gravity_slope(stance) @ (point - stance.com[:2])
+    return gravity
+
+
+def gravity_slope(stance: Stance) -> Float[np.ndarray, "nb 2"]:
+    """S = dG_b/dc, the base's rows by world x, y of the centre of mass [N]."""
+    model, nb = stance.robot.model, stance.robot.base_nv
+    data = model.createData()
+    pin.computeJointJacobians(model, data, stance.q)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    turning = pin.getJointJacobian(model, data, 1, world)[3:, :nb]
+    # By virtual work the base carries the weight's moment, c x (-m g), along what it can turn.
+    lift = -stance.robot.mass * np.asarray(model.gravity.linear)
+    return np.asarray(turning.T @ np.cross(np.eye(3)[:2], lift).T)
+
+
+def com_axes(stance: Stance) -> Float[np.ndarray, "2 r"]:
+    """Orthonormal horizontal directions in which the CoM may move: x and y, or a plane's own."""
+    if stance.robot.base_nv == 6:
+        return np.eye(2)
+    u, size, _ = np.linalg.svd(gravity_slope(stance).T)
+    axes = u[:, size > _NOTHING * stance.robot.weight]
+    return np.asarray(axes * np.sign(axes.sum(axis=0)))

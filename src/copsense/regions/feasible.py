@@ -1,0 +1,166 @@
+"""The region where some static equilibrium within limits exists."""
+
+from __future__ import annotations
+
+import daqp
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+from jaxtyping import Float
+
+from copsense.arrays import finite_number
+from copsense.errors import InfeasibleError, InvalidInputError
+from copsense.limits import Limits, limit_rows
+from copsense.regions.balance import com_axes, gravity_slope
+from copsense.regions.polygon import MERGE, Point, refine
+from copsense.regions.region import BOX, ComRegion, region_between
+from copsense.stance import Stance
+
+FINEST = 1e-7  # m: tolerances below this ask more than the linear programs resolve
+_NOTHING = 1e-9  # of the weight: conflicts of limits that rounding explains
+_PROOF = 1e-10  # of the weight, or m: what a linear program's solution may leave
+_SHORTEST = 1e-3  # norm of a row under which it is not scaled up
+_UNSOLVED = (
+    "the linear program of a region could not be solved: its limits are too far apart in size. "
+    "Bring them nearer to the robot's weight and torques."
+)
+_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the slower solver, in the order tried
+
+
+def com_region(stance: Stance, limits: Limits, *, tolerance: float = 1e-4) -> ComRegion:
+    """Where the CoM may be so that some static equilibrium within the limits exists.
+
+    J, G_j and every contact stay at the stance's posture; see the module's text. The projection of
+    all feasible (c, f) on c is refined between an inner and an outer polygon ([Bretl2008]), edge
+    by edge, each by a linear program, until they are nowhere farther apart than the tolerance.
+    Vertices of the inner one are vertices of the region, so that a region of few vertices comes
+    out exact to the precision of the linear programs, some 1e-9 m.
+
+    Args:
+        stance: robot, posture and contacts; the contacts may be anywhere, walls included.
+        limits: what the wrenches and torques must respect. Friction and soles only:
+            ``torque=None``.
+        tolerance: largest distance between the polygon and the region [m], `FINEST` at least.
+
+    Raises:
+        InfeasibleError: no equilibrium within the limits, wherever the CoM is; names the limits in
+            conflict.
+        InvalidInputError: a bad tolerance, or limits that do not fit the stance.
+        UnknownNameError: a torque limit names no joint.
+    """
+    if finite_number(tolerance, "the tolerance [m]", positive=True) < FINEST:
+        raise InvalidInputError(
+            f"the tolerance is {tolerance:g} m, finer than linear programs resolve. Give "
+            f"{FINEST:g} or more; vertices are exact where the region has few."
+        )
+    axes = com_axes(stance)
+    problem = _Problem(stance, limits, axes)
+    inner, outer = refine(problem.farthest, tolerance - 2 * MERGE)
+    return region_between(stance, inner, outer, interval=axes.shape[1] == 1)
+
+
+class _Problem:
+    """The feasible forces and CoM positions, as linear programs.
+
+    With c = c0 + axes z the balance J_b' f - S axes z = G_b(c0) is solved by
+    (f / weight, z) = x0 + N y, and what remains is A y <= b with the limits and |z| <= BOX.
+    """
+
+    def __init__(self, stance: Stance, limits: Limits, axes: Float[np.ndarray, "2 r"]) -> None:
+        nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
+        all_rows = limit_rows(stance, limits)
+        rows, bound = all_rows.over_forces(stance)
+        self.names = all_rows.names + all_rows.torque_names
+        E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
+        self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
+        self.N = scipy.linalg.null_space(E)
+        self.c0, self.axes, self.weight = stance.com[:2], axes, weight
+        box = np.hstack([np.zeros((r, E.shape[1] - r)), np.eye(r)])
+        full = np.vstack([np.hstack([rows, np.zeros((len(rows), r))]), box, -box])
+        self.scale = np.maximum(np.linalg.norm(full, axis=1), _SHORTEST)
+        self.A = np.ascontiguousarray(full @ self.N / self.scale[:, None])
+        self.b = (np.append(bound / weight, np.full(2 * r, BOX)) - full @ self.x0) / self.scale
+
+    def farthest(self, direction: Point) -> Point:
+        """A feasible CoM position (2,) [m] that lies farthest along a horizontal direction."""
+        r = self.axes.shape[1]
+        cost = -direction @ self.axes @ self.N[-r:]
+        y = self._solve_fast(cost)
+        if y is None:
+            y = self._solve(cost)
+        if y is None:
+            self._relax()
+            y = self._solve(cost)
+        if y is None:
+            raise InvalidInputError(_UNSOLVED)
+        return np.asarray(self.c0 + self.axes @ (self.x0[-r:] + self.N[-r:] @ y))
+
+    def _solve_fast(self, cost: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"] | None:
+        """The minimum of cost y, if the solver's multipliers l prove it: cost + A' l = 0, l >= 0.
+
+        Then cost y >= -l b for every feasible y, which has to be met.
+        """
+        k, v = self.A.shape
+        y, _, flag, info = daqp.solve(
+            np.zeros((v, v)),
+            cost,
+            self.A,
+            self.b,
+            np.full(k, -1e30),
+            np.zeros(k, dtype=np.int32),
+            primal_tol=1e-11,
+            dual_tol=1e-12,
+            # A linear program as proximal steps, until the steps no longer move.
+            eps_prox=1e-4,
+            eta_prox=1e-12,
+            iter_limit=1000,
+        )
+        if flag != 1 or not np.all(np.isfinite(y)):
+            return None
+        l = np.asarray(info["lam"])
+        proofs = (self.A @ y - self.b, -l, np.abs(cost + self.A.T @ l), cost @ y + l @ self.b)
+        return y if max(float(np.max(p, initial=0.0)) for p in proofs) <= _PROOF else None
+
+    def _solve(self, cost: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"] | None:
+        """The minimum of cost y by the slower solver; None where it finds none."""
+        for tolerance in _TOLERANCES:  # some faces are too slight for the finest
+            found = _linear_program(cost, self.A, self.b, tolerance)
+            if found.status == 0:
+                return np.asarray(found.x)
+        return None
+
+    def _relax(self) -> None:
+        """Give way by what rounding takes, or say which limits are in conflict.
+
+        minimise s subject to A f - s <= b: the least amount by which each limit gives way.
+        """
+        v = self.A.shape[1]
+        soft = 1.0 / self.scale
+        soft[len(self.names) :] = 0.0  # the box is no limit
+        A = np.vstack([np.hstack([self.A, -soft[:, None]]), -np.eye(v + 1)[-1:]])
+        b = np.append(self.b, 0.0)
+        found = _linear_program(np.append(np.zeros(v), 1.0), A, b, _TOLERANCES[0])
+        if found.status != 0:
+            raise InvalidInputError(_UNSOLVED)
+        if found.fun <= _NOTHING:
+            self.b = self.b + (found.fun + _PROOF) * soft
+            return
+        pressing = np.flatnonzero(found.ineqlin.marginals < -_NOTHING)
+        names = dict.fromkeys(self.names[i] for i in pressing if i < len(self.names))
+        raise InfeasibleError(float(found.fun) * self.weight, tuple(names))
+
+
+def _linear_program(
+    cost: Float[np.ndarray, " v"],
+    A: Float[np.ndarray, "k v"],
+    b: Float[np.ndarray, " k"],
+    tolerance: float,
+) -> scipy.optimize.OptimizeResult:
+    """Minimise cost y subject to A y <= b."""
+    options = {
+        "primal_feasibility_tolerance": tolerance,
+        "dual_feasibility_tolerance": tolerance,
+    }
+    return scipy.optimize.linprog(
+        cost, A, b, bounds=(None, None), method="highs-ds", options=options
+    )
