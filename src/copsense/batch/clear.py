@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch.result import BatchResult, array_names
-from copsense.cop import half_planes
+from copsense.contact import half_planes
 from copsense.criterion import Criterion
 from copsense.equilibrium import WrenchLaw
 from copsense.errors import CopsenseError

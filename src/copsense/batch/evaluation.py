@@ -64,7 +64,7 @@ class BatchKernel:
         self.names = tuple(names)
         self._single: Any = None
         self._choices = choices(stance, self.criteria)
-        self.why_clear = not_covered(stance.robot, stance.contacts)
+        self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
         if not self.why_clear and importlib.util.find_spec("numba") is None:
             self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
         if not self.why_clear and not len(self._choices.column):
