@@ -127,6 +127,10 @@ class OutputError(CopsenseError):
     """A file cannot be written where it was asked for, or would overwrite another."""
 
 
+class SchedulerError(CopsenseError):
+    """A cluster's scheduler or its workers cannot be used."""
+
+
 class InfeasibleError(CopsenseError):
     """No contact wrench respects the limits.
 
