@@ -16,6 +16,7 @@ from copsense._version import __version__
 from copsense.cli.analyse import analyse
 from copsense.cli.design import design
 from copsense.cli.four_bar import four_bar
+from copsense.cli.map import map_command
 from copsense.cli.reproduce import reproduce
 from copsense.cli.robots import robots
 from copsense.cli.sweep import plot, sweep
@@ -35,7 +36,7 @@ def copsense() -> None:
     """
 
 
-for _command in (robots, four_bar, analyse, sweep, plot, design, reproduce):
+for _command in (robots, four_bar, analyse, sweep, plot, map_command, design, reproduce):
     copsense.add_command(_command)
 
 

@@ -8,7 +8,7 @@ from copsense.maps.mapping import load_map, map_postures, map_summary
 from copsense.maps.marginal import Marginal, marginal
 from copsense.maps.plan import MapPlan
 from copsense.maps.sampling import Axis, Grid, Sample
-from copsense.maps.skeleton import skeleton
+from copsense.maps.skeleton import skeleton, worst_stances
 from copsense.maps.summary import CriterionSummary, MapSummary, WorstPosture
 
 __all__ = [
@@ -25,4 +25,5 @@ __all__ = [
     "map_summary",
     "marginal",
     "skeleton",
+    "worst_stances",
 ]

@@ -1,11 +1,15 @@
-"""Skeleton: a posture as lines between its joints, to be drawn."""
+"""Skeleton: a posture as lines between its joints, to be drawn; those of a map's worst."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.batch import PostureChart
+from copsense.maps.summary import WorstPosture
 from copsense.stance import Stance
 
 
@@ -19,3 +23,12 @@ def skeleton(stance: Stance) -> Float[np.ndarray, "s 2 3"]:
     for contact, place in zip(stance.contacts, stance.placements, strict=True):
         lines.append((origins[stance.robot.frame(contact.frame).parentJoint], place.translation))
     return np.array(lines).reshape(-1, 2, 3)
+
+
+def worst_stances(stance: Stance, worst: Sequence[WorstPosture]) -> list[Stance]:
+    """The stances at a map's worst postures, solved again from their coordinates."""
+    if not worst:
+        return []
+    names = tuple(worst[0].coordinates)
+    values = np.array([[w.coordinates[n] for n in names] for w in worst])
+    return [stance.at(q) for q in PostureChart(stance, names).solve(values).configurations]

@@ -50,6 +50,7 @@ class MapStore:
     Attributes:
         path: of its folder.
         parameters: what decides its numbers.
+        coordinates: columns of the coordinates.
     """
 
     def __init__(self, path: Path, group: Any) -> None:
@@ -65,6 +66,11 @@ class MapStore:
     def attributes(self) -> dict[str, Any]:
         """Attributes of the root."""
         return dict(self._group.attrs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates, of which `coordinates` are the columns."""
+        return tuple(axis["name"] for axis in self.parameters["sampling"]["axes"])
 
     @property
     def criteria(self) -> tuple[str, ...]:

@@ -108,7 +108,7 @@ def summarise(store: MapStore) -> MapSummary:
     return MapSummary(
         str(store.path),
         str(store.parameters["robot"]["name"]),
-        store.coordinates,
+        store.names,
         tuple(store.units(name) for name in store.coordinates),
         len(store),
         len(done),
@@ -118,5 +118,8 @@ def summarise(store: MapStore) -> MapSummary:
 
 
 def _posture(store: MapStore, row: int, value: float) -> WorstPosture:
-    where = {name: float(store.read(name, row, row + 1)[0]) for name in store.coordinates}
+    where = {
+        name: float(store.read(column, row, row + 1)[0])
+        for name, column in zip(store.names, store.coordinates, strict=True)
+    }
     return WorstPosture(row, where, value)

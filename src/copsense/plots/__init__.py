@@ -15,6 +15,7 @@ from copsense.plots.curves import (
     plot_travel,
 )
 from copsense.plots.limits import plot_limited, plot_regions
+from copsense.plots.maps import plot_map
 from copsense.plots.paper import (
     plot_criteria_curves,
     plot_figure_3,
@@ -36,6 +37,7 @@ __all__ = [
     "plot_foot_cop",
     "plot_limited",
     "plot_load",
+    "plot_map",
     "plot_margin",
     "plot_regions",
     "plot_results",
