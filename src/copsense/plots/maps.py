@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
 from copsense.maps.marginal import Marginal
@@ -92,13 +93,15 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, text: str, **colour: Any)
     mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(cells.T), shading="flat", **colour)
     mesh.set_rasterized(True)
     known = cells[np.isfinite(cells)]
-    if min(cells.shape) > 1 and len(known) > 3 and known.max() > known.min():
+    # The same levels in a row: what is flat beside the other has no line.
+    levels = MaxNLocator(_LEVELS).tick_values(colour["vmin"], colour["vmax"])
+    crossed = [
+        level for level in levels if known.min(initial=np.inf) < level < known.max(initial=-np.inf)
+    ]
+    if min(cells.shape) > 1 and crossed:
+        ink = "white" if colour["cmap"] == "viridis" else INK
         lines = ax.contour(
-            *middles,
-            np.ma.masked_invalid(cells.T),
-            levels=_LEVELS,
-            colors=INK,
-            linewidths=0.7,
+            *middles, np.ma.masked_invalid(cells.T), levels=crossed, colors=ink, linewidths=0.7
         )
         ax.clabel(lines, fmt=text, fontsize=7)
     words = [
