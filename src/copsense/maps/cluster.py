@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import pickle
+import socket
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -45,7 +46,10 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     if scheduler is not None:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the error says it all
         try:
-            client = distributed.Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
+            # Asked first, since a client that finds nobody takes its time, and is loud.
+            host, port = distributed.comm.get_address_host_port(scheduler, strict=True)
+            socket.create_connection((host, port), timeout=_TIMEOUT).close()
+            client = distributed.Client(scheduler, timeout=_TIMEOUT)
         except (OSError, ValueError, TimeoutError) as error:
             raise SchedulerError(
                 f"no Dask scheduler answers at {scheduler} ({error}). Start one "
@@ -66,7 +70,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
         ) as cluster,
-        distributed.Client(cluster, set_as_default=False) as client,
+        distributed.Client(cluster) as client,
     ):
         yield client
 
