@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -11,7 +12,7 @@ import pytest
 
 import copsense
 from copsense.errors import CopsenseError, SchedulerError
-from copsense.maps import Sample
+from copsense.maps import Axis, Sample
 
 
 def _workers():
@@ -42,7 +43,9 @@ def test_a_worker_killed_among_four_leaves_the_store_as_one_process_does(
     assert same(tmp_path / "one.zarr", tmp_path / "four.zarr")
 
 
-def test_a_command_killed_and_resumed_leaves_the_store_as_one_process_does(tmp_path, same):
+def test_a_command_killed_and_resumed_leaves_the_store_as_one_process_does(
+    icub, both, tmp_path, same
+):
     arguments = ["map", "icub", "--over", "com_y=-0.05:0.05", "--over", "com_z=0.46:0.52"]
     arguments += ["--samples", "4000", "--seed", "3", "--chunk", "100", "--output"]
     command = [sys.executable, "-c", "from copsense.cli import main; main()", *arguments]
@@ -56,17 +59,31 @@ def test_a_command_killed_and_resumed_leaves_the_store_as_one_process_does(tmp_p
     process.kill()
     process.wait()
     assert 5 <= copsense.map_summary(killed).chunks_done < 40
-    for path in (killed, whole):
-        done = subprocess.run(
-            [*command, str(path)], env=environment, capture_output=True, text=True
-        )
-        assert done.returncode == 1, done.stderr  # some postures are out of reach
-        assert "Traceback" not in done.stderr
+    done = subprocess.run([*command, str(killed)], env=environment, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr  # some postures are out of reach
+    assert "Traceback" not in done.stderr
+    axes = (Axis("com_y", -0.05, 0.05), Axis("com_z", 0.46, 0.52))
+    copsense.map_postures(icub, Sample(axes, 4000, seed=3), both, whole, chunk=100)
     assert copsense.map_summary(killed).complete
     assert same(killed, whole)
 
 
-@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense", "tcp://nowhere.invalid:8786"])
+@pytest.fixture
+def mute():
+    """Address of a server that takes connections and never speaks."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+
+
+def test_a_server_that_never_speaks_is_given_up_on(mute, icub, both, sample, tmp_path):
+    start = time.monotonic()
+    with pytest.raises(SchedulerError, match="no answer within 5 s"):
+        copsense.map_postures(icub, sample, both, tmp_path / "m.zarr", scheduler=mute)
+    assert time.monotonic() - start < 15
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
 def test_a_scheduler_that_does_not_answer_is_one_error_and_nothing_written(
     address, icub, both, sample, tmp_path
 ):

@@ -7,11 +7,12 @@ it could say so, is written twice with the same bits.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import pickle
-import socket
 import uuid
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -46,13 +47,14 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     if scheduler is not None:
         logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the error says it all
         try:
-            # Asked first, since a client that finds nobody takes its time, and is loud.
-            host, port = distributed.comm.get_address_host_port(scheduler, strict=True)
-            socket.create_connection((host, port), timeout=_TIMEOUT).close()
+            # A thread of its own, since the caller's may have a loop that runs, as notebooks do.
+            with ThreadPoolExecutor(1) as thread:
+                thread.submit(asyncio.run, _answer(scheduler)).result()
             client = distributed.Client(scheduler, timeout=_TIMEOUT)
         except (OSError, ValueError, TimeoutError) as error:
+            late = f"no answer within {_TIMEOUT:g} s"
             raise SchedulerError(
-                f"no Dask scheduler answers at {scheduler} ({error}). Start one "
+                f"no Dask scheduler answers at {scheduler} ({str(error) or late}). Start one "
                 "with `dask scheduler`, and give the address it prints, such as "
                 "tcp://127.0.0.1:8786."
             ) from None
@@ -73,6 +75,16 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         distributed.Client(cluster) as client,
     ):
         yield client
+
+
+async def _answer(scheduler: str) -> None:
+    """Ask a scheduler who it is: a client that finds nobody takes its time, and is loud."""
+    import distributed
+
+    async with distributed.rpc(scheduler) as there:
+        who = await asyncio.wait_for(there.identity(), _TIMEOUT)
+    if who.get("type") != "Scheduler":
+        raise ValueError(f"a {who.get('type')} is there")
 
 
 def evaluate_there(
