@@ -284,17 +284,14 @@ def _spread(tree: Tree, plan: Plan, rows: Rows, mine: Search, W: Any) -> None:
         sr, cr = sine_cosine(0.5 * angle[0])
         sp, cp = sine_cosine(0.5 * angle[1])
         sy, cy = sine_cosine(0.5 * angle[2])
-        # Rz(yaw) Ry(pitch) Rx(roll).
-        store3(
-            W,
-            rows.q + 3,
-            (
-                sr * cp * cy - cr * sp * sy,
-                cr * sp * cy + sr * cp * sy,
-                cr * cp * sy - sr * sp * cy,
-            ),
-        )
-        store(W, rows.q + 6, cr * cp * cy + sr * sp * sy)
+        # Rz(yaw) Ry(pitch) Rx(roll); of the two signs the one nearer to the stance's.
+        x, y = sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy
+        z, w = cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy
+        near = plan.quaternion
+        along = x * near[0] + y * near[1] + z * near[2] + w * near[3]
+        sign = where_less(along, 0.0, splat(W, -1.0), splat(W, 1.0))
+        store3(W, rows.q + 3, (sign * x, sign * y, sign * z))
+        store(W, rows.q + 6, sign * w)
         s, c = 2.0 * sy * cy, cy * cy - sy * sy  # of the whole angles
         t, d = 2.0 * sp * cp, cp * cp - sp * sp
         zero = splat(W, 0.0)

@@ -120,7 +120,8 @@ def _moved(
         local = model.jointPlacements[1].actInv(place)
         q[:3] = local.translation
         if plan.turned:
-            q[3:7] = pin.SE3ToXYZQUAT(local)[3:]
+            turn = pin.SE3ToXYZQUAT(local)[3:]
+            q[3:7] = -turn if turn @ stance.q[3:7] < 0 else turn
         else:
             q[3:7] = stance.q[3:7]
             root = model.jointPlacements[1]
