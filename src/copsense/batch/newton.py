@@ -52,6 +52,7 @@ from copsense.batch.steps import (
     ROUNDING,
     SOLVED,
     STUCK,
+    TINY,
     TOLERANCE,
     UNSOLVED,
 )
@@ -442,7 +443,7 @@ def _step(feet: Feet, plan: Plan, mine: Search, W: Any, limb: int) -> None:
                 s = s + load(W, a + c) * load(W, b + c)
             store(W, mine.M + m * i + j, s)
         trace = trace + load(W, mine.M + (m + 1) * i)
-    mu = DAMPING * square + FLOOR * trace
+    mu = DAMPING * square + FLOOR * trace + TINY
     for i in range(m):
         at = mine.M + (m + 1) * i
         store(W, at, load(W, at) + mu)

@@ -24,6 +24,7 @@ from copsense.batch.steps import (
     ROUNDING,
     SOLVED,
     STUCK,
+    TINY,
     TOLERANCE,
     UNSOLVED,
 )
@@ -88,7 +89,7 @@ def _advance(here: Stance, plan: Coordinates, given: np.ndarray, h: np.ndarray) 
         first += len(J)
         # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
         M = J @ J.T
-        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M))
+        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
         step = -J.T @ np.linalg.solve(M + mu * np.eye(len(M)), e)
         longest = float(np.abs(step).max(initial=0.0))
         given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
