@@ -41,16 +41,14 @@ def drawn(name, base, *, reach=0.02):
 def pipeline(chart, values, threads):
     """Solve and evaluate both criteria with CoM gain and travel, chunk by chunk."""
     kernel = BatchKernel(chart.stance, [copsense.minimum_wrench(1.0), copsense.minimum_torque()])
-    out = chart.empty(CHUNK)
-    results = {}
+    postures, results = chart.empty(CHUNK), kernel.empty(CHUNK)
 
     def run():
         for start in range(0, len(values), CHUNK):
-            batch = chart.solve(values[start : start + CHUNK], out=out, threads=threads)
-            q = batch.configurations[batch.converged]
-            if len(q) not in results:
-                results[len(q)] = kernel.empty(len(q))
-            kernel.evaluate(q, out=results[len(q)], threads=threads)
+            batch = chart.solve(values[start : start + CHUNK], out=postures, threads=threads)
+            # Rows without a posture are evaluated as the stance: every row costs the same.
+            batch.configurations[~batch.converged] = chart.stance.q
+            kernel.evaluate(batch.configurations, out=results, threads=threads)
 
     return run
 
