@@ -175,6 +175,25 @@ def test_a_foot_is_moved_on_its_plane(case, name):
     np.testing.assert_allclose(found.gradient[0, 0], clear.gradient, rtol=0, atol=1e-9)
 
 
+def test_headings_are_absolute(case):
+    source = case("icub")
+    turn = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, 0.4), np.array([0.3, -0.2, 0.1]))
+    q = source.q.copy()
+    q[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(np.array(q[:7])))
+    stance = source.at(q)
+    chart = PostureChart(stance, ["l_sole:yaw", "l_sole:x", "com_y"])
+    x_axis, place = stance.placements[0].rotation[:, 0], stance.placements[0].translation
+    heading = np.arctan2(x_axis[1], x_axis[0])
+    assert abs(heading) > 0.3
+    np.testing.assert_allclose(chart.values, [heading, place[0], stance.com[1]], rtol=0, atol=1e-12)
+    wanted = np.add(chart.values, (0.05, 0.004, 0.003))
+    batch = chart.solve(wanted[None])
+    foot = stance.at(batch.configurations[0]).placements[0]
+    x_axis = foot.rotation[:, 0]
+    assert np.arctan2(x_axis[1], x_axis[0]) == pytest.approx(wanted[0], abs=MET)
+    assert foot.translation[0] == pytest.approx(wanted[1], abs=MET)
+
+
 def test_what_cannot_be_is_a_row_with_its_reason(case):
     stance = case("icub")
     chart = PostureChart(stance, ["base_z", "l_elbow"])

@@ -18,6 +18,7 @@ from copsense.batch.coordinates import checked_values, joint_units, row_units
 from copsense.batch.coordinates import coordinates as named
 from copsense.batch.layout import layout, not_covered
 from copsense.batch.newton_clear import search_one
+from copsense.batch.planning import plan_search
 from copsense.batch.posture_batch import PostureBatch, empty_postures
 from copsense.batch.rows import rows
 from copsense.batch.steps import BEYOND, ELSEWHERE, SOLVED, STUCK
@@ -75,8 +76,6 @@ class PostureChart:
         if not self.why_clear and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
             self.why_clear = "the model's root is not the world"
         if not self.why_clear:
-            from copsense.batch.planning import plan_search
-
             self._layout = layout(stance, [np.zeros((0, 3)) for _ in stance.contacts])
             self._rows = rows(self._layout, stance.robot.model.nq)
             self._flat, self._search = plan_search(stance, self._layout, self._rows, self._plan)
