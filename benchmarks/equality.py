@@ -101,7 +101,7 @@ def draw(stance, count, seed):
 def largest_error(given, expected):
     """Largest difference, relative to the largest finite entry expected."""
     finite = np.isfinite(expected)
-    if not np.array_equal(given[~finite], expected[~finite]):
+    if not np.array_equal(given[~finite], expected[~finite]) or np.isnan(given).any():
         return np.inf
     if not finite.any():
         return 0.0
