@@ -8,7 +8,7 @@ import copsense
 from copsense.batch import BatchKernel, evaluate_batch
 
 RELATIVE = 1e-9
-PER_CASE = 40  # times four criteria, ten cases; benchmarks/kernel.py --equality has 10 000
+PER_CASE = 40  # times four criteria, ten cases; benchmarks/equality.py has 10 000 postures
 
 
 def largest_error(given, expected):

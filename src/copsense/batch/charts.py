@@ -14,10 +14,11 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import ArrayLike
 
-from copsense.batch.coordinates import checked_values
+from copsense.batch.coordinates import checked_values, joint_units, row_units
 from copsense.batch.coordinates import coordinates as named
 from copsense.batch.layout import layout, not_covered
 from copsense.batch.newton_clear import search_one
+from copsense.batch.planning import plan_search
 from copsense.batch.posture_batch import PostureBatch, empty_postures
 from copsense.batch.rows import rows
 from copsense.batch.steps import BEYOND, ELSEWHERE, SOLVED, STUCK
@@ -25,7 +26,6 @@ from copsense.errors import InvalidInputError
 from copsense.stance import Stance
 
 _BLOCK = 512  # postures that a thread takes at a time
-_WAYS = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 
 class PostureChart:
@@ -69,14 +69,13 @@ class PostureChart:
         self.names, self.units = self._plan.names, self._plan.units
         self.values = self._plan.given[self._plan.place]
         self.values.flags.writeable = False
+        self._joints, self._rows_named = joint_units(stance), row_units(stance, self._plan)
         self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
         if not self.why_clear and importlib.util.find_spec("numba") is None:
             self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
         if not self.why_clear and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
             self.why_clear = "the model's root is not the world"
         if not self.why_clear:
-            from copsense.batch.planning import plan_search
-
             self._layout = layout(stance, [np.zeros((0, 3)) for _ in stance.contacts])
             self._rows = rows(self._layout, stance.robot.model.nq)
             self._flat, self._search = plan_search(stance, self._layout, self._rows, self._plan)
@@ -120,10 +119,8 @@ class PostureChart:
         failed = np.flatnonzero(~batch.converged)
         batch.configurations[failed] = np.nan
         for row in failed:
-            batch.reasons[row] = (
-                self._over(int(which[row]), float(excess[row]))
-                if status[row] == BEYOND
-                else self._unmet(int(status[row]), int(which[row]), float(batch.residuals[row]))
+            batch.reasons[row] = self._why_not(
+                int(status[row]), int(which[row]), excess[row], batch.residuals[row]
             )
         return batch
 
@@ -166,29 +163,14 @@ class PostureChart:
             with ThreadPoolExecutor(threads) as pool:
                 list(pool.map(run, range(threads)))
 
-    def _over(self, joint: int, excess: float) -> str:
-        model, nb = self.stance.robot.model, self.stance.robot.base_nv
-        name = next(
-            model.names[i] for i in range(2, model.njoints) if model.joints[i].idx_v == joint + nb
-        )
-        unit = (
-            "m"
-            if model.joints[model.getJointId(name)].shortname().startswith("JointModelP")
-            else "rad"
-        )
-        return f"joint {name} over its limit by {excess:.3g} {unit}"
-
-    def _unmet(self, status: int, which: int, residual: float) -> str:
-        labels = [
-            f"contact {self.stance.contacts[k].name} {_WAYS[i]}"
-            for limb in self._plan.limbs
-            for k in limb.contacts
-            for i in self.stance.contacts[k].components
-        ]
-        labels += [f"the CoM {_WAYS[axis]}" for axis in self._plan.com_axes]
+    def _why_not(self, status: int, which: int, excess: float, residual: float) -> str:
+        """Why a row has no posture."""
+        if status == BEYOND:
+            name, unit = self._joints[which]
+            return f"joint {name} over its limit by {excess:.3g} {unit}"
         how = "unreachable" if status == STUCK else "did not converge"
-        unit = "rad" if "about" in labels[which] else "m"
-        return f"{how}: {labels[which]} remains {residual:.2e} {unit} off"
+        label, unit = self._rows_named[which]
+        return f"{how}: {label} remains {residual:.2e} {unit} off"
 
     def _fitting(self, out: PostureBatch, count: int) -> PostureBatch:
         wanted = self.empty(0)

@@ -20,6 +20,8 @@ from copsense.stance import Stance
 COM = ("com_x", "com_y", "com_z")
 BASE = ("base_x", "base_y", "base_z", "roll", "pitch", "yaw")
 FOOT = ("x", "y", "yaw")
+_WAYS = ("along x", "along y", "along z", "about x", "about y", "about z")
+_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 _STEEP = 0.2  # a plane's normal with less of the vertical is no ground to place a foot on
 
 
@@ -153,6 +155,23 @@ def checked_values(values: object, names: tuple[str, ...]) -> np.ndarray:
     return np.ascontiguousarray(
         finite_array(values, "values of a chart", (None, len(names)), meaning)
     )
+
+
+def joint_units(stance: Stance) -> list[tuple[str, str]]:
+    """Name of each joint velocity and the unit of its position."""
+    robot, found = stance.robot, []
+    for joint, name in zip(list(robot.model.joints)[2:], robot.joint_names, strict=True):
+        found += [(name, _unit(stance, name))] * joint.nv
+    return found
+
+
+def row_units(stance: Stance, plan: Coordinates) -> list[tuple[str, str]]:
+    """What each constraint holds, in the order of a plan's limbs, and its unit."""
+    found = []
+    for k in (k for limb in plan.limbs for k in limb.contacts):
+        contact = stance.contacts[k]
+        found += [(f"contact {contact.name} {_WAYS[i]}", _UNITS[i]) for i in contact.components]
+    return found + [(f"the CoM {_WAYS[axis]}", "m") for axis in plan.com_axes]
 
 
 def _one(stance: Stance, joint: str) -> bool:

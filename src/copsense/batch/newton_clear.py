@@ -24,6 +24,7 @@ from copsense.batch.steps import (
     ROUNDING,
     SOLVED,
     STUCK,
+    TINY,
     TOLERANCE,
     UNSOLVED,
 )
@@ -88,7 +89,7 @@ def _advance(here: Stance, plan: Coordinates, given: np.ndarray, h: np.ndarray) 
         first += len(J)
         # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
         M = J @ J.T
-        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M))
+        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
         step = -J.T @ np.linalg.solve(M + mu * np.eye(len(M)), e)
         longest = float(np.abs(step).max(initial=0.0))
         given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
@@ -120,7 +121,8 @@ def _moved(
         local = model.jointPlacements[1].actInv(place)
         q[:3] = local.translation
         if plan.turned:
-            q[3:7] = pin.SE3ToXYZQUAT(local)[3:]
+            turn = pin.SE3ToXYZQUAT(local)[3:]
+            q[3:7] = -turn if turn @ stance.q[3:7] < 0 else turn
         else:
             q[3:7] = stance.q[3:7]
             root = model.jointPlacements[1]

@@ -2,13 +2,80 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from copsense.batch.coordinates import Coordinates
 from copsense.batch.layout import Layout
-from copsense.batch.newton import Plan, Search
 from copsense.batch.rows import Rows
 from copsense.stance import Stance
+
+
+class Plan(NamedTuple):
+    """A chart's coordinates as flat arrays; see `Coordinates`.
+
+    Attributes:
+        given: the stance's numbers.
+        place: which of them each coordinate sets (k,).
+        com_axis: axes of the CoM that are named.
+        turned: 1 where the base's orientation may differ from the stance's.
+        quaternion: the stance's (4,).
+        position: origin of each contact (nc, 3).
+        axes: its axes, three columns (nc, 9).
+        slope: of its plane (nc, 2).
+        contact: the contacts, limb by limb (nc,).
+        contact_first: first of each limb's, and the end.
+        unknown: the unknowns, limb by limb.
+        unknown_first: first of each limb's, and the end.
+        carries: whether a joint (1 ... n) moves a contact (n + 1, nc).
+        low: lower limit of each joint (n,).
+        high: upper limit (n,).
+    """
+
+    given: np.ndarray
+    place: np.ndarray
+    com_axis: np.ndarray
+    turned: int
+    quaternion: np.ndarray
+    position: np.ndarray
+    axes: np.ndarray
+    slope: np.ndarray
+    contact: np.ndarray
+    contact_first: np.ndarray
+    unknown: np.ndarray
+    unknown_first: np.ndarray
+    carries: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+class Search(NamedTuple):
+    """First row of each block that the search adds to a workspace.
+
+    Attributes:
+        given: the given numbers.
+        turn: axes about which roll, pitch and yaw turn the base (3, 3).
+        error: h of every contact, limb by limb, then of the CoM.
+        worst: the largest of them.
+        going: above zero where the lane goes on.
+        J: by rows.
+        M: J J' + mu 1, then its Cholesky factor, by rows.
+        multiplier: of each row.
+        step: of each unknown.
+        size: rows in all.
+    """
+
+    given: int
+    turn: int
+    error: int
+    worst: int
+    going: int
+    J: int
+    M: int
+    multiplier: int
+    step: int
+    size: int
 
 
 def plan_search(

@@ -3,6 +3,7 @@
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 DAMPING = 0.1  # of |h|^2
 FLOOR = 1e-14  # of the trace of J J'
+TINY = 1e-200  # where nothing moves: no division by zero
 LONGEST_STEP = 0.5  # rad or m
 MOST_STEPS = 60
 PATIENCE = 6  # steps after which the worst error must have come down ...
