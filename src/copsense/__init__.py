@@ -41,6 +41,7 @@ from copsense.equilibrium import (
 )
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
+from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
 from copsense.margins import limit_margins, limit_travel
 from copsense.motion import Path, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
@@ -70,6 +71,7 @@ from copsense.sweep import failed_rows, sweep
 __all__ = [
     "CRITERIA",
     "PRESETS",
+    "Axis",
     "ComRegion",
     "ConstrainedEquilibrium",
     "Contact",
@@ -78,6 +80,7 @@ __all__ = [
     "Criterion",
     "Design",
     "EdgeMargin",
+    "Grid",
     "LimitChange",
     "Limits",
     "Path",
@@ -85,6 +88,7 @@ __all__ = [
     "Posture",
     "PostureCost",
     "Robot",
+    "Sample",
     "Sole",
     "Stance",
     "StaticEquilibrium",
@@ -111,9 +115,12 @@ __all__ = [
     "lateral_sweep",
     "limit_margins",
     "limit_travel",
+    "load_map",
     "load_results",
     "load_robot",
     "load_stance",
+    "map_postures",
+    "map_summary",
     "minimum_tangential",
     "minimum_torque",
     "minimum_wrench",

@@ -19,8 +19,8 @@ from copsense.criterion import (
     weighted_torque,
 )
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
-from copsense.limits import Limits, limit_rows
-from copsense.margins import MarginTable
+from copsense.limits import Limits
+from copsense.margins import margin_table
 from copsense.motion import Path
 from copsense.posture import supporting_joints
 from copsense.sensitivity import cop_sensitivity
@@ -208,8 +208,7 @@ def score(
         CopsenseError: the criterion fails at a posture of the path.
     """
     middle = len(path) // 2
-    centre = path.stances[middle]
-    table = MarginTable(centre.contacts, limit_rows(centre, limits))
+    table = margin_table(path.stances[middle], limits)
     rows, gains, norms = [], [], []
     for stance in path.stances:
         result = cop_sensitivity(stance, criterion)

@@ -135,6 +135,10 @@ class ControllerError(CopsenseError):
     """A controller raised, or returned something that is no vector of torques."""
 
 
+class SchedulerError(CopsenseError):
+    """A cluster's scheduler or its workers cannot be used."""
+
+
 class InfeasibleError(CopsenseError):
     """No contact wrench respects the limits.
 

@@ -81,8 +81,7 @@ class Travel:
 
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
-    stance = equilibrium.stance
-    table = MarginTable(stance.contacts, limit_rows(stance, limits))
+    table = margin_table(equilibrium.stance, limits)
     values = table.values(equilibrium.forces, equilibrium.torques)
     return tuple(table.margin(rows, values) for rows in table.groups)
 
@@ -114,7 +113,7 @@ def limit_travel(
     """
     if direction not in (1, -1):
         raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    table = MarginTable(stance.contacts, limit_rows(stance, limits))
+    table = margin_table(stance, limits)
     y0 = float(stance.com[1])
 
     def at(y: float, near: Stance) -> tuple[Stance, np.ndarray]:
@@ -235,6 +234,11 @@ class MarginTable:
         return LimitMargin(
             self.names[i], self.where[i], kind, float(values[i]), UNITS.get(kind, "N")
         )
+
+
+def margin_table(stance: Stance, limits: Limits) -> MarginTable:
+    """The table of a stance's limits."""
+    return MarginTable(stance.contacts, limit_rows(stance, limits))
 
 
 def _normal_rows(contacts: Sequence[Contact]) -> np.ndarray:

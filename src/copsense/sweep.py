@@ -275,7 +275,7 @@ def _dataset(
         "velocity": list(stance.robot.velocity_names),
     }
     taken = {*data, *coordinates, *(d for dims, *_ in data.values() for d in dims)}
-    coordinate = _variable_name(path.coordinate, taken)
+    coordinate = variable_name(path.coordinate, taken)
     coordinates[coordinate] = (
         "posture",
         path.values,
@@ -299,7 +299,7 @@ def _dataset(
     return xr.Dataset(data, coordinates, attributes)
 
 
-def _variable_name(name: str, taken: set[str]) -> str:
+def variable_name(name: str, taken: set[str]) -> str:
     """A name that netCDF allows and no other variable has: a joint may be called anything."""
     plain = re.sub(r"[^\w.-]", "_", name)
     if not (plain[0].isalnum() or plain[0] == "_"):

@@ -8,8 +8,8 @@ from random_cases import random_stance
 
 import copsense
 from copsense.cop import contact_cops
-from copsense.limits import Limits, limit_rows, torque_limits
-from copsense.margins import MarginTable, limit_margins
+from copsense.limits import Limits, torque_limits
+from copsense.margins import limit_margins, margin_table
 
 
 @pytest.fixture(scope="module", params=["icub", "talos", "g1"])
@@ -115,7 +115,7 @@ def test_rates_are_the_derivatives_of_the_margins(stance_of):
     rng = np.random.default_rng(9)
     stance = random_stance(stance_of("icub"), rng)
     limits = replace(Limits(), torque=20.0, friction_sides=4)
-    table = MarginTable(stance.contacts, limit_rows(stance, limits))
+    table = margin_table(stance, limits)
 
     def values(at):
         found = copsense.solve_equilibrium(at, copsense.minimum_torque())

@@ -18,6 +18,7 @@ from copsense.cli.balance import balance
 from copsense.cli.benchmark import benchmark
 from copsense.cli.design import design
 from copsense.cli.four_bar import four_bar
+from copsense.cli.map import map_command
 from copsense.cli.reproduce import reproduce
 from copsense.cli.robots import robots
 from copsense.cli.sweep import plot, sweep
@@ -37,7 +38,18 @@ def copsense() -> None:
     """
 
 
-for _command in (robots, four_bar, analyse, sweep, plot, design, balance, benchmark, reproduce):
+for _command in (
+    robots,
+    four_bar,
+    analyse,
+    sweep,
+    plot,
+    map_command,
+    design,
+    balance,
+    benchmark,
+    reproduce,
+):
     copsense.add_command(_command)
 
 

@@ -17,6 +17,7 @@ from copsense.plots.curves import (
 )
 from copsense.plots.design import plot_design
 from copsense.plots.limits import plot_limit_margins, plot_limited, plot_regions
+from copsense.plots.maps import plot_map
 from copsense.plots.paper import (
     plot_criteria_curves,
     plot_figure_3,
@@ -48,6 +49,7 @@ __all__ = [
     "plot_limit_margins",
     "plot_limited",
     "plot_load",
+    "plot_map",
     "plot_margin",
     "plot_regions",
     "plot_results",

@@ -1,0 +1,186 @@
+"""Charts: named coordinates in, postures with the contacts in place out, many at once.
+
+A chart takes the base's pose and the joints off the limbs as they are given, and solves the limbs:
+a leg of six joints under a flat foot is a 6 x 6 system of its own. See `PostureChart`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from copsense.batch.coordinates import checked_values, joint_units, row_units
+from copsense.batch.coordinates import coordinates as named
+from copsense.batch.layout import layout, not_covered
+from copsense.batch.newton_clear import search_one
+from copsense.batch.planning import plan_search
+from copsense.batch.posture_batch import PostureBatch, empty_postures
+from copsense.batch.rows import rows
+from copsense.batch.steps import BEYOND, ELSEWHERE, SOLVED, STUCK
+from copsense.errors import InvalidInputError
+from copsense.stance import Stance
+
+_BLOCK = 512  # postures that a thread takes at a time
+
+
+class PostureChart:
+    """Postures of a stance by named coordinates, its contacts in place.
+
+    A coordinate is one of
+
+    - ``com_x``, ``com_y``, ``com_z``: the CoM in the world [m]; the base moves along that axis;
+    - ``base_x``, ``base_y``, ``base_z``: the base's origin in the world [m];
+    - ``roll``, ``pitch``, ``yaw``: its orientation Rz(yaw) Ry(pitch) Rx(roll) [rad];
+    - a joint's name [rad, or m for a prismatic joint];
+    - ``CONTACT:x``, ``CONTACT:y``: world x and y of a contact, which stays on its plane [m];
+      ``CONTACT:yaw``: its x axis' angle in the plane, from the world's x axis laid on it [rad].
+
+    What is not named keeps the stance's value; the joints of the limbs in contact are solved for.
+    Where a limb cannot follow (a joint of a leg is named; a leg has fewer joints than its foot has
+    directions) the base coordinates that are not named give way. Where joints or base leave a
+    choice, every step of the search is the smallest one. Each row starts from the stance's own
+    configuration, so that it depends on its values alone.
+
+    Contacts that a chart moves need nothing more from `evaluate_batch`: where they stand follows
+    from the configuration, and they stay on the planes that the stance states.
+
+    Attributes:
+        stance: where the search starts, and what the coordinates not named are kept from.
+        names: the coordinates.
+        units: ``"m"`` or ``"rad"`` for each.
+        values: of the stance itself (k,).
+        why_clear: why postures are solved one at a time; empty where the kernel does it.
+    """
+
+    def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
+        """Find out what the names mean.
+
+        Raises:
+            InvalidInputError: no name, one twice, or two that contradict each other.
+            UnknownNameError: a name that is none of a coordinate.
+        """
+        self.stance = stance
+        self._plan = named(stance, coordinates)
+        self.names, self.units = self._plan.names, self._plan.units
+        self.values = self._plan.given[self._plan.place]
+        self.values.flags.writeable = False
+        self._joints, self._rows_named = joint_units(stance), row_units(stance, self._plan)
+        self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
+        if not self.why_clear and importlib.util.find_spec("numba") is None:
+            self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
+        if not self.why_clear and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
+            self.why_clear = "the model's root is not the world"
+        if not self.why_clear:
+            self._layout = layout(stance, [np.zeros((0, 3)) for _ in stance.contacts])
+            self._rows = rows(self._layout, stance.robot.model.nq)
+            self._flat, self._search = plan_search(stance, self._layout, self._rows, self._plan)
+
+    def empty(self, count: int) -> PostureBatch:
+        """Arrays for `count` postures, to be filled with ``out=``."""
+        return empty_postures(self.stance, count)
+
+    def solve(
+        self, values: ArrayLike, out: PostureBatch | None = None, threads: int = 1
+    ) -> PostureBatch:
+        """Solve for many postures.
+
+        Args:
+            values: of the coordinates, one posture in each row (N, k) [m, rad].
+            out: a batch of the same size to overwrite.
+            threads: threads that share the postures; the results do not depend on it.
+
+        Returns:
+            Postures that meet every constraint within 1e-12. A row that has none, or that
+            is beyond a joint limit, is NaN and has its reason.
+
+        Raises:
+            InvalidInputError: values of the wrong shape or not finite; `out` of another size.
+        """
+        x = checked_values(values, self.names)
+        if int(threads) != threads or threads < 1:
+            raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
+        batch = self.empty(len(x)) if out is None else self._fitting(out, len(x))
+        batch.reasons[:] = ""
+        status = np.full(len(x), ELSEWHERE, dtype=np.int64)
+        which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
+        if not self.why_clear and len(x):
+            self._run(x, batch, status, which, excess, int(threads))
+        for row in np.flatnonzero(status == ELSEWHERE):
+            found = search_one(self.stance, self._plan, x[row])
+            batch.configurations[row], batch.residuals[row] = found.q, found.residual
+            batch.iterations[row], status[row] = found.iterations, found.status
+            which[row], excess[row] = found.which, found.excess
+        np.equal(status, SOLVED, out=batch.converged)
+        failed = np.flatnonzero(~batch.converged)
+        batch.configurations[failed] = np.nan
+        for row in failed:
+            batch.reasons[row] = self._why_not(
+                int(status[row]), int(which[row]), excess[row], batch.residuals[row]
+            )
+        return batch
+
+    def _run(
+        self,
+        x: np.ndarray,
+        batch: PostureBatch,
+        status: np.ndarray,
+        which: np.ndarray,
+        excess: np.ndarray,
+        threads: int,
+    ) -> None:
+        from copsense.batch import lanes, newton
+
+        found = newton.Found(
+            batch.configurations, batch.residuals, batch.iterations, status, which, excess
+        )
+        blocks = -(-len(x) // _BLOCK)
+
+        def run(share: int) -> None:
+            W = lanes.workspace(self._search.size)
+            for block in range(share, blocks, threads):
+                start, stop = block * _BLOCK, min((block + 1) * _BLOCK, len(x))
+                newton.search(
+                    *self._layout.parts,
+                    self._flat,
+                    self._rows,
+                    self._search,
+                    x,
+                    found,
+                    W,
+                    start,
+                    stop,
+                    lanes.WIDTH,
+                )
+
+        if threads == 1:
+            run(0)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(run, range(threads)))
+
+    def _why_not(self, status: int, which: int, excess: float, residual: float) -> str:
+        """Why a row has no posture."""
+        if status == BEYOND:
+            name, unit = self._joints[which]
+            return f"joint {name} over its limit by {excess:.3g} {unit}"
+        how = "unreachable" if status == STUCK else "did not converge"
+        label, unit = self._rows_named[which]
+        return f"{how}: {label} remains {residual:.2e} {unit} off"
+
+    def _fitting(self, out: PostureBatch, count: int) -> PostureBatch:
+        wanted = self.empty(0)
+        for field in fields(PostureBatch):
+            array = getattr(out, field.name)
+            shape = (count, *getattr(wanted, field.name).shape[1:])
+            if array.shape != shape or not array.flags.c_contiguous or not array.flags.writeable:
+                raise InvalidInputError(
+                    f"out.{field.name} has shape {array.shape}, or is not contiguous and "
+                    f"writeable; the chart needs {shape}. Make it with "
+                    f"PostureChart.empty({count})."
+                )
+        return out

@@ -1,0 +1,265 @@
+"""Evaluation: many configurations in, wrenches, CoPs and sensitivities out.
+
+The compiled kernel answers what it covers; the clear path answers everything else, row by row,
+into the same arrays, and so does it where the kernel finds a posture in doubt: contacts that lose
+rank, a contact without load or off its plane. Without Numba the clear path answers all.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.arrays import finite_array
+from copsense.batch.choice import choices
+from copsense.batch.clear import fill_row, sole_edges
+from copsense.batch.layout import layout, not_covered
+from copsense.batch.result import BatchResult, array_names, empty_result
+from copsense.batch.rows import rows
+from copsense.criterion import Criterion
+from copsense.equilibrium import WrenchLaw, law_name
+from copsense.errors import InvalidInputError
+from copsense.stance import Stance
+
+_CHUNK = 512  # postures whose results stay in a core's cache
+_UNIT = 1e-6  # by which a quaternion may miss unit length, as in `Robot.check_configuration`
+
+
+class BatchKernel:
+    """A robot, its contacts and some criteria, made ready for many configurations.
+
+    Attributes:
+        stance: gives robot and contacts; its configuration does not matter.
+        criteria: the criteria or laws, of distinct names.
+        gains: whether CoM gain and CoM travel are computed too.
+        why_clear: why the clear path answers everything; empty where the kernel does its part.
+    """
+
+    def __init__(
+        self, stance: Stance, criteria: Sequence[Criterion | WrenchLaw], *, gains: bool = True
+    ) -> None:
+        """Check the criteria and lay the robot out.
+
+        Raises:
+            InvalidInputError: no criterion, two of one name, or weights that do not fit.
+        """
+        if isinstance(criteria, Criterion):
+            raise InvalidInputError("criteria is a single criterion. Give a list of them.")
+        self.stance, self.criteria, self.gains = stance, tuple(criteria), gains
+        names = [str(c.name) if isinstance(c, Criterion) else law_name(c) for c in criteria]
+        if not names or len(set(names)) != len(names):
+            raise InvalidInputError(
+                f"a batch needs criteria of distinct names, got {', '.join(names) or 'none'}. "
+                "Give at least one; Criterion.named(...) renames one."
+            )
+        self.names = tuple(names)
+        self._single: Any = None
+        self._choices = choices(stance, self.criteria)
+        self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
+        if not self.why_clear and importlib.util.find_spec("numba") is None:
+            self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
+        if not self.why_clear and not len(self._choices.column):
+            self.why_clear = "no criterion is a weighted norm of torques and wrenches"
+        if not self.why_clear:
+            self._layout = layout(stance, sole_edges(stance))
+            self._rows = rows(self._layout, stance.robot.model.nq)
+            if not len(self._layout.feet.support):
+                self.why_clear = "no joint moves between the contacts"
+
+    def empty(self, count: int) -> BatchResult:
+        """Arrays for the results of `count` postures, to be filled with ``out=``."""
+        return empty_result(self.stance, self.names, count, gains=self.gains)
+
+    def evaluate(
+        self,
+        configurations: ArrayLike,
+        *,
+        out: BatchResult | None = None,
+        threads: int = 1,
+    ) -> BatchResult:
+        """Evaluate every criterion at every configuration; see `evaluate_batch`."""
+        q = self._checked(configurations)
+        if int(threads) != threads or threads < 1:
+            raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
+        result = self.empty(len(q)) if out is None else self._fitting(out, len(q))
+        doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
+        if not self.why_clear and len(q):
+            self._run(q, result, doubtful, int(threads))
+        reasons = {}
+        for i, j in np.argwhere(doubtful):
+            row, column = int(i), int(j)
+            reason = fill_row(self.stance, q[row], self.criteria[column], result, row, column)
+            if reason:
+                reasons[row, column] = reason
+        return replace(result, reasons=reasons)
+
+    def one(self, q: np.ndarray) -> BatchResult:
+        """Evaluate one configuration (nq,), for a controller's loop: nothing is allocated.
+
+        Returns:
+            One row, overwritten by the next call.
+
+        Raises:
+            InvalidInputError: a configuration that is no contiguous array of nq floats, not finite
+                or not normalised.
+        """
+        if self._single is None:
+            self._single = self._single_kernel()
+        single, row = self._single, q
+        if not _is_row(row, self.stance.robot.model.nq):
+            row = self.stance.robot.check_configuration(row)
+        if isinstance(single, BatchResult):
+            result, doubtful = single, list(range(len(self.names)))
+        else:
+            single.evaluate(row[None])
+            result = single.result
+            if not single.doubtful.any():
+                return result
+            doubtful = [int(j) for j in np.flatnonzero(single.doubtful)]
+        self.stance.robot.check_configuration(row)
+        reasons = {}
+        for j in doubtful:
+            reason = fill_row(self.stance, row, self.criteria[j], result, 0, j)
+            if reason:
+                reasons[0, j] = reason
+        return replace(result, reasons=reasons)
+
+    def _single_kernel(self) -> Any:
+        """What `one` runs: a kernel, or for the clear path alone a row to fill."""
+        empty = self.empty(1)
+        if self.why_clear:
+            return empty
+        from copsense.batch.single import Single
+
+        return Single(self._layout, self._choices, self._rows, empty, self.gains)
+
+    def _run(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
+        kernel, lanes = _kernel()
+        out = kernel.Out(
+            **{n: _flat(a) for n, a in _arrays(result).items() if n != "com"},
+            com=result.com,
+            doubtful=doubtful,
+        )
+        blocks = -(-len(q) // _CHUNK)
+
+        def run(share: int) -> None:
+            W = lanes.workspace(self._rows.size)
+            for block in range(share, blocks, threads):
+                start, stop = block * _CHUNK, min((block + 1) * _CHUNK, len(q))
+                kernel.run(
+                    *self._layout.parts,
+                    self._choices,
+                    self._rows,
+                    q,
+                    out,
+                    W,
+                    start,
+                    stop,
+                    lanes.WIDTH,
+                )
+
+        if threads == 1:
+            run(0)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(run, range(threads)))
+
+    def _checked(self, configurations: ArrayLike) -> Float[np.ndarray, "N nq"]:
+        robot = self.stance.robot
+        nq = robot.model.nq
+        what = f"the configurations of robot {robot.name!r}"
+        q = np.ascontiguousarray(configurations) if _is_plain(configurations) else configurations
+        if not (isinstance(q, np.ndarray) and q.shape == (len(q), nq) and np.isfinite(q).all()):
+            q = finite_array(configurations, what, (None, nq), "one configuration in each row")
+        if robot.base_nv == 6:
+            length = np.einsum("ij,ij->i", q[:, 3:7], q[:, 3:7])
+            bad = np.flatnonzero(np.abs(length - 1.0) > _UNIT)
+            # Whoever is refused here is refused by the robot itself, which words it.
+            for row in bad:
+                robot.check_configuration(q[row])
+        return np.asarray(q)
+
+    def _fitting(self, out: BatchResult, count: int) -> BatchResult:
+        wanted = {name: array.shape for name, array in _arrays(self.empty(0)).items()}
+        for name, array in _arrays(out).items():
+            first = 0 if name.startswith("com_") and not self.gains else count
+            shape = (first, *wanted[name][1:])
+            if array.shape != shape or not array.flags.c_contiguous or not array.flags.writeable:
+                raise InvalidInputError(
+                    f"out.{name} has shape {array.shape}, or is not contiguous and writable; the "
+                    f"batch needs {shape}. Make it with BatchKernel.empty({count})."
+                )
+        if out.criteria != self.names:
+            raise InvalidInputError(
+                f"out holds the criteria {', '.join(out.criteria)}, the batch "
+                f"{', '.join(self.names)}. Make it with BatchKernel.empty({count})."
+            )
+        return out
+
+
+def evaluate_batch(
+    stance: Stance,
+    configurations: ArrayLike,
+    criteria: Sequence[Criterion | WrenchLaw],
+    *,
+    gains: bool = True,
+    out: BatchResult | None = None,
+    threads: int = 1,
+) -> BatchResult:
+    """Equilibria and sensitivities of many postures.
+
+    Args:
+        stance: gives robot and contacts; its own configuration does not matter.
+        configurations: one in each row (N, nq).
+        criteria: criteria of distinct names, or laws q -> wrenches.
+        gains: compute CoM gain and CoM travel too.
+        out: results of the same shape to overwrite, so that nothing is allocated.
+        threads: threads that share the postures; the results do not depend on it.
+
+    Returns:
+        Results equal to `cop_sensitivity`'s of every row. A row that it would refuse is NaN and
+        has its reason in `BatchResult.reasons`.
+
+    Raises:
+        InvalidInputError: configurations of the wrong shape, not finite or not normalised;
+            criteria that do not fit; `out` of another shape.
+    """
+    batch = BatchKernel(stance, criteria, gains=gains)
+    return batch.evaluate(configurations, out=out, threads=threads)
+
+
+def _kernel() -> tuple[ModuleType, ModuleType]:
+    from copsense.batch import kernel, lanes
+
+    return kernel, lanes
+
+
+def _arrays(result: BatchResult) -> dict[str, np.ndarray]:
+    return {name: getattr(result, name) for name in array_names()}
+
+
+def _flat(array: np.ndarray) -> np.ndarray:
+    """The same memory with one axis after posture and criterion (-1 fails on empty arrays)."""
+    return array.reshape(*array.shape[:2], math.prod(array.shape[2:]))
+
+
+def _is_row(value: object, nq: int) -> bool:
+    return (
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and value.shape == (nq,)
+        and value.flags.c_contiguous
+    )
+
+
+def _is_plain(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim == 2

@@ -1,0 +1,166 @@
+"""Gains: the CoPs' answer to the centre of mass, and how far it may travel.
+
+The gain is taken along the admissible motions of least kinetic energy per CoM x and y velocity
+(theory: Gamma = eta S J_c' (J_c S J_c')^-1, S = (Z' M Z)^-1). A force through the CoM accelerates
+the whole robot without turning a joint, M^-1 J_c' e = (translation along e) / m. So with M = L' L
+(Featherstone 2005, sparse along the tree) and x = L (translation), taking off x its part in the
+span of L^-T J' leaves the motion sought, u = L^-1 x, up to a 2 x 2 normalisation.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from copsense.batch.inertia import ancestor
+from copsense.batch.lanes import (
+    compiled,
+    cross3,
+    load,
+    load3,
+    root,
+    splat,
+    store,
+    where_less,
+)
+from copsense.batch.layout import Feet, Tree
+from copsense.batch.loops import factorise
+from copsense.batch.rows import Rows
+
+_STILL = 1e-12  # gains under which nothing moves, as in `CopSensitivity`
+_FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways
+
+
+@compiled
+def com_motions(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
+    """The two motions (2, nv) of unit CoM velocity along x and y, the base in world axes."""
+    nv, ns, r = len(tree.parent) + 5, len(feet.support), feet.unknowns
+    m = 6 + ns
+    for c in range(r + 6):
+        _constraint(feet, rows, W, rows.Y + m * c, c, nv)
+    lost = factorise(W, rows.Y, rows.RY, m, r + 6)
+    store(W, rows.flag, where_less(lost, 0.5, load(W, rows.flag), splat(W, 1.0)))
+    for e in range(2):
+        at = rows.motion + nv * e
+        for i in range(nv):
+            store(W, at + i, load(W, rows.H + nv * i + e) if i >= e else splat(W, 0.0))
+        for c in range(r + 6):
+            y = rows.Y + m * c
+            s = load(W, y) * load(W, at)
+            for i in range(1, 6):
+                s = s + load(W, y + i) * load(W, at + i)
+            for t in range(ns):
+                s = s + load(W, y + 6 + t) * load(W, at + 5 + feet.support[t])
+            for i in range(6):
+                store(W, at + i, load(W, at + i) - s * load(W, y + i))
+            for t in range(ns):
+                i = at + 5 + feet.support[t]
+                store(W, i, load(W, i) - s * load(W, y + 6 + t))
+        for i in range(nv):
+            s = load(W, at + i)
+            j = ancestor(tree, i)
+            while j >= 0:
+                s = s - load(W, rows.H + nv * i + j) * load(W, at + j)
+                j = ancestor(tree, j)
+            store(W, at + i, s / load(W, rows.H + nv * i + i))
+    _normalise(tree, rows, W, nv)
+
+
+@compiled
+def _constraint(feet: Feet, rows: Rows, W: Any, y: int, c: int, nv: int) -> None:
+    """y = L^-T of a row of the contact Jacobian, (0, Q) or (1, D), on base and support joints."""
+    ns, r = len(feet.support), feet.unknowns
+    for i in range(6):
+        store(W, y + i, splat(W, 1.0 if i == c - r else 0.0))
+    for t in range(ns):
+        z = load(W, rows.Q + ns * c + t) if c < r else load(W, rows.held_row + 6 * t + c - r)
+        store(W, y + 6 + t, z)
+    for t in range(ns - 1, -1, -1):
+        own = rows.H + nv * (5 + feet.support[t])
+        x = load(W, y + 6 + t) / load(W, own + 5 + feet.support[t])
+        store(W, y + 6 + t, x)
+        up = feet.anchor[feet.support[t]]
+        while up >= 0:
+            before = load(W, y + 6 + up)
+            store(W, y + 6 + up, before - load(W, own + 5 + feet.support[up]) * x)
+            up = feet.anchor[feet.support[up]]
+        for i in range(6):
+            store(W, y + i, load(W, y + i) - load(W, own + i) * x)
+    for i in range(5, -1, -1):
+        own = rows.H + nv * i
+        x = load(W, y + i) / load(W, own + i)
+        store(W, y + i, x)
+        for j in range(i):
+            store(W, y + j, load(W, y + j) - load(W, own + j) * x)
+
+
+@compiled
+def _com_velocity(tree: Tree, rows: Rows, W: Any, at: int) -> Any:
+    """Velocity of the CoM, x and y, of a motion."""
+    m = tree.carried[0]
+    v, w = load3(W, at), load3(W, at + 3)
+    turned = cross3(w, load3(W, rows.first_moment))
+    x, y = m * v[0] + turned[0], m * v[1] + turned[1]
+    for i in range(1, len(tree.parent)):
+        rate = load(W, at + 5 + i)
+        x = x + load(W, rows.moment_rate + 3 * i) * rate
+        y = y + load(W, rows.moment_rate + 3 * i + 1) * rate
+    return x / m, y / m
+
+
+@compiled
+def _normalise(tree: Tree, rows: Rows, W: Any, nv: int) -> None:
+    first, second = rows.motion, rows.motion + nv
+    a, c = _com_velocity(tree, rows, W, first)
+    b, d = _com_velocity(tree, rows, W, second)
+    det, trace = a * d - b * c, a + d
+    flag = load(W, rows.flag)
+    store(W, rows.flag, where_less(_FIXED * trace * trace, det, flag, splat(W, 1.0)))
+    for i in range(nv):
+        u, v = load(W, first + i), load(W, second + i)
+        store(W, first + i, (u * d - v * c) / det)
+        store(W, second + i, (v * a - u * b) / det)
+
+
+@compiled
+def com_gains(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
+    """Gamma (nc, 2, 2) of the gradients at hand, their base part still in world axes."""
+    nv = len(tree.parent) + 5
+    for output in range(2 * len(feet.body)):
+        for e in range(2):
+            g, u = rows.gradient + nv * output, rows.motion + nv * e
+            s = load(W, g) * load(W, u)
+            for i in range(1, nv):
+                s = s + load(W, g + i) * load(W, u + i)
+            store(W, rows.gain + 2 * output + e, s)
+
+
+@compiled
+def margins(feet: Feet, rows: Rows, W: Any, travel: bool) -> None:
+    """Distance to each sole's nearest edge; with `travel`, how far the CoM may move before it.
+
+    The travel is the least margin / |a' Gamma| over the edges that Gamma moves the CoP towards or
+    from; an edge already passed that nothing moves makes it minus infinity.
+    """
+    for k in range(len(feet.body)):
+        x, y = load(W, rows.cop + 2 * k), load(W, rows.cop + 2 * k + 1)
+        least, free = splat(W, np.inf), splat(W, np.inf)
+        beyond = splat(W, 1.0)
+        for e in range(feet.edge_first[k], feet.edge_first[k + 1]):
+            ax, ay, b = feet.edges[e, 0], feet.edges[e, 1], feet.edges[e, 2]
+            margin = b - (ax * x + ay * y)
+            least = where_less(margin, least, margin, least)
+            if travel:
+                gain = rows.gain + 4 * k
+                u = ax * load(W, gain) + ay * load(W, gain + 2)
+                v = ax * load(W, gain + 1) + ay * load(W, gain + 3)
+                speed = root(u * u + v * v)
+                distance = where_less(_STILL, speed, margin / speed, splat(W, np.inf))
+                free = where_less(distance, free, distance, free)
+                lost = where_less(margin, 0.0, splat(W, -1.0), splat(W, 1.0))
+                lost = where_less(_STILL, speed, splat(W, 1.0), lost)
+                beyond = where_less(lost, beyond, lost, beyond)
+        store(W, rows.margin + k, least)
+        if travel:
+            store(W, rows.travel + k, where_less(beyond, 0.0, splat(W, -np.inf), free))

@@ -1,0 +1,212 @@
+"""Gradients: every CoP's sensitivity ([Romano2016] Eq. (11)) by adjoints, one sweep each.
+
+A CoP coordinate changes as dp = l . df, l its covector on the wrenches. Let mu be the internal
+wrenches (sum mu_k = 0) that the criterion's curvature H answers to l with, H(mu, .) + l = xi on
+every contact, xi one twist for all. Differentiating the criterion's condition along mu leaves
+
+    dp = xi . db + sum_i [lambda_i (dG_i - ds_i . phi_i) - nu_i ds_i . mu_i],
+    nu_i = w_i tau_i,  lambda_i = -w_i s_i . mu_i      (phi_i, mu_i: sums over what joint i carries)
+
+and no derivative of an inverse. With Omega_i = xi's rotation + sum lambda_j a_j down to body i and
+Jacobi's identity, what is left per joint is the covector
+
+    dp/dq_i = dh/dq_i . (Omega_parent x g) + s_i . sum of T_j over what joint i carries,
+    T_j = -lambda_j ([0; dh/dq_j x g] + s_j x* phi_j) - nu_j s_j x* mu_j.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from copsense.batch.choice import WEIGHTED, Choices
+from copsense.batch.kinematics import screw_cross
+from copsense.batch.lanes import (
+    add3,
+    compiled,
+    cross3,
+    dot3,
+    load,
+    load3,
+    scale3,
+    splat,
+    store,
+    store3,
+    sub3,
+)
+from copsense.batch.layout import PRISMATIC, Feet, Tree
+from copsense.batch.loops import expand, gather_groups, solve_lower, solve_upper
+from copsense.batch.rows import Rows
+from copsense.batch.sharing import across_symmetric
+from copsense.batch.tangents import project, store_base_and_joints
+
+
+@compiled
+def wrench_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any, arm: float) -> None:
+    """Gradients under the minimum wrench, which follow the centre of mass alone.
+
+    dp = beta . dM_c with dM_c = -dh x g, so dp = dh . (beta x g); for p_x (p_y alike, with x)
+    beta = I^-1 (-L^2 y - p_x (rho x z)) / f_z.
+    """
+    nv = len(tree.parent) + 5
+    g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
+    first, second = tree.level[0], tree.level[1]
+    for k in range(len(feet.body)):
+        if feet.point[k]:
+            _stand_still(rows, W, k, nv)
+            continue
+        axes = rows.foot_rotation + 9 * k
+        z = load3(W, axes + 6)
+        lean = cross3(sub3(load3(W, rows.foot + 3 * k), load3(W, rows.middle)), z)
+        share = 1.0 / load(W, rows.contact_wrench + 6 * k + 2)
+        for axis in range(2):
+            p = load(W, rows.cop + 2 * k + axis)
+            own = scale3(-arm, load3(W, axes + 3)) if axis == 0 else scale3(arm, load3(W, axes))
+            beta = across_symmetric(W, rows.middle + 3, scale3(share, sub3(own, scale3(p, lean))))
+            u = cross3(beta, g)
+            a = u[0] * first[0] + u[1] * first[1] + u[2] * first[2]
+            b = u[0] * second[0] + u[1] * second[1] + u[2] * second[2]
+            at = rows.gradient + nv * (2 * k + axis)
+            for i in range(nv):
+                store(W, at + i, a * load(W, rows.level + i) + b * load(W, rows.level + nv + i))
+
+
+@compiled
+def _stand_still(rows: Rows, W: Any, k: int, nv: int) -> None:
+    """A point contact's CoP is its origin."""
+    for i in range(2 * nv):
+        store(W, rows.gradient + 2 * nv * k + i, splat(W, 0.0))
+
+
+@compiled
+def torque_gradients(
+    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int
+) -> None:
+    """Gradients under a criterion of weighted torques, and wrenches."""
+    nv = len(tree.parent) + 5
+    _lever_arms(tree, feet, rows, W)
+    for k in range(len(feet.body)):
+        if feet.point[k]:
+            _stand_still(rows, W, k, nv)
+            continue
+        for axis in range(2):
+            at = rows.gradient + nv * (2 * k + axis)
+            _adjoint(tree, feet, rows, W, choices, index, k, axis)
+            _sweep(tree, feet, rows, W, choices, index, at)
+            project(feet, rows, W, at, rows.felt)
+
+
+@compiled
+def _lever_arms(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
+    """A_j = [0; dh/dq_j x g] + s_j x* phi_j, the same for every output."""
+    g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
+    for t in range(len(feet.support)):
+        i, phi = feet.support[t], rows.group + 6 * feet.group[t]
+        F, M = screw_cross(W, rows.screw + 6 * i, load3(W, phi), load3(W, phi + 3))
+        store3(W, rows.lever_arm + 6 * t, F)
+        weight = cross3(load3(W, rows.moment_rate + 3 * i), g)
+        store3(W, rows.lever_arm + 6 * t + 3, add3(M, weight))
+
+
+@compiled
+def _covector(rows: Rows, W: Any, k: int, axis: int) -> Any:
+    """l of p_x = -m_y / f_z or p_y = m_x / f_z, on the wrench about the base's origin."""
+    axes = rows.foot_rotation + 9 * k
+    share = 1.0 / load(W, rows.contact_wrench + 6 * k + 2)
+    p = load(W, rows.cop + 2 * k + axis)
+    force = scale3(-(p * share), load3(W, axes + 6))
+    moment = scale3(-share, load3(W, axes + 3)) if axis == 0 else scale3(share, load3(W, axes))
+    return add3(force, cross3(load3(W, rows.foot + 3 * k), moment)), moment
+
+
+@compiled
+def _adjoint(
+    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, k: int, axis: int
+) -> None:
+    """mu (into `inner`) and xi (into `twist`) of one output.
+
+    mu = N z with the internal wrenches N of the unknowns: R' R z = -N' l.
+    """
+    ns, r, held = len(feet.support), feet.unknowns, feet.order[0]
+    weighted = choices.kind[index] == WEIGHTED
+    v, w = _covector(rows, W, k, axis)
+    for j in range(r):
+        store(W, rows.unknown + j, splat(W, 0.0))
+    for e in feet.order[1:]:
+        # The held contact feels the opposite of every other.
+        if e == k or held == k:
+            sign = -1.0 if e == k else 1.0
+            at, own = rows.unknown + feet.first[e], v
+            if feet.point[e]:
+                own = add3(v, cross3(w, load3(W, rows.foot + 3 * e)))
+            store3(W, at, scale3(sign, own))
+            if not feet.point[e]:
+                store3(W, at + 3, scale3(sign, w))
+    R = rows.Rw if weighted else rows.R
+    solve_lower(W, R, rows.unknown, r)
+    solve_upper(W, R, rows.unknown, r)
+    expand(feet, rows, W, rows.unknown, rows.nothing, rows.inner)
+    gather_groups(feet, W, rows.inner, rows.inner_group)
+    if held != k:
+        v, w = scale3(0.0, v), scale3(0.0, w)
+    if weighted:
+        # W_f mu of the held contact, moved to the base's origin.
+        F, M = load3(W, rows.inner + 6 * held), load3(W, rows.inner + 6 * held + 3)
+        r_held = load3(W, rows.foot + 3 * held)
+        m = scale3(choices.moment[index], sub3(M, cross3(r_held, F)))
+        v = add3(v, add3(scale3(choices.force[index], F), cross3(r_held, m)))
+        w = add3(w, m)
+    for t in range(ns):
+        i, mu = feet.support[t], rows.inner_group + 6 * feet.group[t]
+        s = rows.screw + 6 * i
+        change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
+        weight = choices.joint[index, i] if weighted else 1.0
+        rate = change * (-weight)
+        store(W, rows.rate + t, rate)
+        if feet.member[feet.group[t], held]:
+            w = sub3(w, scale3(rate, load3(W, s + 3)))
+    store3(W, rows.twist, w)  # of xi only the rotation matters: gravity is the same everywhere
+
+
+@compiled
+def _sweep(
+    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, at: int
+) -> None:
+    """One output's gradient (nv,) at row `at`, base in world axes, not yet projected."""
+    ns = len(feet.support)
+    weighted = choices.kind[index] == WEIGHTED
+    g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
+    base = load3(W, rows.twist)
+    store_base_and_joints(tree, rows, W, at, cross3(base, g))
+    for t in range(ns):
+        i, up = feet.support[t], feet.anchor[feet.support[t]]
+        omega = load3(W, rows.turning + 3 * up) if up >= 0 else base
+        rate = load(W, rows.rate + t)
+        drive = cross3(omega, g)
+        store(W, rows.felt + t, dot3(load3(W, rows.moment_rate + 3 * i), drive))
+        if tree.kind[i] != PRISMATIC:
+            omega = add3(omega, scale3(rate, load3(W, rows.screw + 6 * i + 3)))
+        store3(W, rows.turning + 3 * t, omega)
+        mu = rows.inner_group + 6 * feet.group[t]
+        F, M = screw_cross(W, rows.screw + 6 * i, load3(W, mu), load3(W, mu + 3))
+        nu = load(W, rows.torque + i)
+        if weighted:
+            nu = nu * choices.joint[index, i]
+        A = rows.lever_arm + 6 * t
+        F = scale3(-1.0, add3(scale3(rate, load3(W, A)), scale3(nu, F)))
+        M = scale3(-1.0, add3(scale3(rate, load3(W, A + 3)), scale3(nu, M)))
+        store3(W, rows.pull + 6 * t, F)
+        store3(W, rows.pull + 6 * t + 3, M)
+    for t in range(ns - 1, -1, -1):
+        i, up = feet.support[t], feet.anchor[feet.support[t]]
+        s, T = rows.screw + 6 * i, rows.pull + 6 * t
+        F, M = load3(W, T), load3(W, T + 3)
+        power = dot3(load3(W, s), F) + dot3(load3(W, s + 3), M)
+        store(W, rows.felt + t, load(W, rows.felt + t) + power)
+        above = rows.pull + 6 * up if up >= 0 else at
+        store3(W, above, add3(load3(W, above), F))
+        store3(W, above + 3, add3(load3(W, above + 3), M))
+    # Joints that hang on a moving support joint but carry no contact.
+    for i in range(1, len(tree.parent)):
+        if feet.anchor[i] >= 0:
+            drive = cross3(load3(W, rows.turning + 3 * feet.anchor[i]), g)
+            store(W, at + 5 + i, dot3(load3(W, rows.moment_rate + 3 * i), drive))

@@ -1,0 +1,384 @@
+"""Lanes: several postures abreast in one value, and the plain arithmetic on it.
+
+A kernel here is written as if for one posture. Its numbers live in the rows of a workspace W, and
+the workspace's shape decides what a number is when Numba compiles the kernel: (rows,) makes it a
+float, (rows, 8) eight floats that the processor handles abreast (LLVM's vector type: one AVX-512
+register, two of AVX2, four of SSE2). No lane ever reads another, so a posture's result does not
+depend on its neighbours, to the last bit.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import operator
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+WIDTH = 8  # postures abreast
+CACHE_LINE = 64  # bytes; a row of eight that straddles two of them costs double
+
+_FLAGS = ("contract",)  # a * b + c in one instruction; nothing is reordered
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+_STAMP = tuple(
+    (file.name, file.stat().st_mtime_ns, file.stat().st_size)
+    for file in sorted(Path(__file__).parent.glob("*.py"))
+)
+
+as_tuple = to_fixed_tuple  # so many entries of an array
+
+# What a kernel computes with: a float, or one per lane. Numba has its own types for them.
+Value = Any
+Vector = tuple[Any, Any, Any]
+
+
+def compiled(function: _Function) -> _Function:
+    """Compile on first use, keep the machine code on disk, and let other threads run meanwhile."""
+    options: dict[str, Any] = {"nogil": True, "fastmath": {"contract"}, "error_model": "numpy"}
+    plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
+    try:
+        dispatcher = njit(cache=True, **options)(plain)
+        # Numba would look at the function's own file alone, and call an older version of a
+        # function from another one: machine code is of use while no file of the kernel changes.
+        dispatcher._cache._cache_file._source_stamp = _STAMP
+    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
+        dispatcher = njit(**options)(plain)
+    return dispatcher
+
+
+def workspace(rows: int, *, width: int = WIDTH) -> np.ndarray:
+    """An uninitialised workspace, each row in a cache line of its own: (rows, 8), or (rows,)."""
+    spare = CACHE_LINE // 8
+    memory = np.zeros(rows * width + spare)
+    start = (-memory.ctypes.data % CACHE_LINE) // 8
+    aligned = memory[start : start + rows * width]
+    return aligned if width == 1 else aligned.reshape(rows, width)
+
+
+class Lanes(types.Type):  # type: ignore[misc]
+    """Numba's type of `WIDTH` floats abreast."""
+
+    def __init__(self, width: int) -> None:
+        """One type for each width."""
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+
+@register_model(Lanes)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, dmm: Any, fe_type: Any) -> None:
+        super().__init__(dmm, fe_type, ir.VectorType(ir.DoubleType(), fe_type.width))
+
+
+_LANES = Lanes(WIDTH)
+
+
+def _value_type(array: Any) -> Any:
+    """What a row of a workspace of this Numba type holds."""
+    return types.float64 if array.ndim == 1 else _LANES
+
+
+def _as(context: Any, builder: Any, value: Any, given: Any, wanted: Any) -> Any:
+    """A value in LLVM, spread over the lanes where it is one number."""
+    if given == wanted:
+        return value
+    if not isinstance(given, Lanes):
+        value = context.cast(builder, value, given, types.float64)
+    if not isinstance(wanted, Lanes):
+        return value
+    vector = ir.VectorType(ir.DoubleType(), wanted.width)
+    first = builder.insert_element(
+        ir.Constant(vector, ir.Undefined), value, ir.Constant(ir.IntType(32), 0)
+    )
+    mask = ir.Constant(ir.VectorType(ir.IntType(32), wanted.width), [0] * wanted.width)
+    return builder.shuffle_vector(first, ir.Constant(vector, ir.Undefined), mask)
+
+
+def _widest(*given: Any) -> Any:
+    """The type that a result of these has; None where one of them is no number."""
+    if any(isinstance(t, Lanes) for t in given):
+        return _LANES
+    return types.float64
+
+
+def _define(operation: Any, instruction: str) -> None:
+    """`a operation b` where one of them is lanes."""
+
+    @infer_global(operation)
+    class Template(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            lanes = [a for a in args if isinstance(a, Lanes)]
+            if len(args) != 2 or not lanes:
+                return None
+            if not all(isinstance(a, Lanes | types.Float | types.Integer) for a in args):
+                return None
+            return signature(_LANES, *args)
+
+    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        a, b = (
+            _as(context, builder, value, given, sig.return_type)
+            for value, given in zip(args, sig.args, strict=True)
+        )
+        return getattr(builder, instruction)(a, b, flags=_FLAGS)
+
+    for left, right in ((Lanes, Lanes), (Lanes, types.Number), (types.Number, Lanes)):
+        lower_builtin(operation, left, right)(lower)
+
+
+_define(operator.add, "fadd")
+_define(operator.sub, "fsub")
+_define(operator.mul, "fmul")
+_define(operator.truediv, "fdiv")
+
+
+@infer_global(operator.neg)
+class _Negative(AbstractTemplate):  # type: ignore[misc]
+    def generic(self, args: Any, kws: Any) -> Any:
+        return signature(_LANES, *args) if isinstance(args[0], Lanes) else None
+
+
+def _negative(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+lower_builtin(operator.neg, Lanes)(_negative)
+
+
+def _primitive(function: Callable[..., Any]) -> Any:
+    return intrinsic(inspect.unwrap(function))
+
+
+def _pointer(context: Any, builder: Any, sig: Any, args: Any) -> tuple[Any, Any]:
+    """Address of a row of the workspace, and the type there."""
+    value = context.get_value_type(_value_type(sig.args[0]))
+    array = cgutils.create_struct_proxy(sig.args[0])(context, builder, value=args[0])
+    width = 1 if sig.args[0].ndim == 1 else WIDTH
+    row = context.cast(builder, args[1], sig.args[1], types.intp)
+    index = builder.mul(row, ir.Constant(row.type, width))
+    return builder.bitcast(builder.gep(array.data, [index]), value.as_pointer()), value
+
+
+@_primitive
+def load(typing: Any, W: Any, row: Any) -> Any:
+    """The value in a row of a workspace."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pointer, _ = _pointer(context, builder, sig, args)
+        return builder.load(pointer, align=8)
+
+    return _value_type(W)(W, row), generate
+
+
+@_primitive
+def store(typing: Any, W: Any, row: Any, value: Any) -> Any:
+    """Write a value, or one number for all lanes, into a row of a workspace."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        pointer, _ = _pointer(context, builder, sig, args)
+        spread = _as(context, builder, args[2], sig.args[2], _value_type(sig.args[0]))
+        builder.store(spread, pointer, align=8)
+        return context.get_dummy_value()
+
+    return types.void(W, row, value), generate
+
+
+@_primitive
+def splat(typing: Any, W: Any, number: Any) -> Any:
+    """One number as a value of a workspace."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return _as(context, builder, args[1], sig.args[1], _value_type(sig.args[0]))
+
+    return _value_type(W)(W, number), generate
+
+
+@_primitive
+def where_less(typing: Any, a: Any, b: Any, then: Any, otherwise: Any) -> Any:
+    """`then` where a < b, else `otherwise` (also where a or b is not a number)."""
+    wanted = _widest(a, b, then, otherwise)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        left, right, yes, no = (
+            _as(context, builder, value, given, sig.return_type)
+            for value, given in zip(args, sig.args, strict=True)
+        )
+        return builder.select(builder.fcmp_ordered("<", left, right), yes, no)
+
+    return wanted(a, b, then, otherwise), generate
+
+
+@_primitive
+def any_less(typing: Any, a: Any, b: Any) -> Any:
+    """Whether a < b for any of the postures."""
+    wanted = _widest(a, b)
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        left, right = (
+            _as(context, builder, value, given, wanted)
+            for value, given in zip(args, sig.args, strict=True)
+        )
+        less = builder.fcmp_ordered("<", left, right)
+        if not isinstance(wanted, Lanes):
+            return less
+        bits = builder.bitcast(less, ir.IntType(wanted.width))
+        return builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+
+    return types.boolean(a, b), generate
+
+
+@_primitive
+def get(typing: Any, W: Any, row: Any, lane: Any) -> Any:
+    """One posture's number in a row of a workspace."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(_element(context, builder, sig, args), align=8)
+
+    return types.float64(W, row, lane), generate
+
+
+@_primitive
+def put(typing: Any, W: Any, row: Any, lane: Any, number: Any) -> Any:
+    """Write one posture's number into a row of a workspace."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        value = context.cast(builder, args[3], sig.args[3], types.float64)
+        builder.store(value, _element(context, builder, sig, args), align=8)
+        return context.get_dummy_value()
+
+    return types.void(W, row, lane, number), generate
+
+
+def _element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    pointer, _ = _pointer(context, builder, sig, args)
+    number = ir.DoubleType().as_pointer()
+    lane = context.cast(builder, args[2], sig.args[2], types.intp)
+    return builder.gep(builder.bitcast(pointer, number), [lane])
+
+
+def _map(name: str) -> Any:
+    """One of LLVM's functions of a number, lane by lane."""
+
+    def function(typing: Any, x: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            value = context.get_value_type(sig.return_type)
+            suffix = f"v{WIDTH}f64" if isinstance(sig.return_type, Lanes) else "f64"
+            kind = ir.FunctionType(value, [value])
+            found = cgutils.get_or_insert_function(builder.module, kind, f"{name}.{suffix}")
+            return builder.call(found, args)
+
+        return _widest(x)(x), generate
+
+    function.__name__ = name.removeprefix("llvm.")
+    return intrinsic(function)
+
+
+root = _map("llvm.sqrt")
+floor = _map("llvm.floor")
+magnitude = _map("llvm.fabs")
+
+
+# sin and cos by the Cephes library's polynomials (S. Moshier) on |r| <= pi/4, after taking off
+# n pi/2 in three parts (Cody and Waite): within 1 ulp of the true value up to `LARGEST_ANGLE`.
+LARGEST_ANGLE = 1e5
+_HALF_PI = (1.5707963109016418, 1.5893254712295857e-08, 6.123233995736766e-17)
+
+
+@compiled
+def sine_cosine(x: Value) -> tuple[Value, Value]:
+    """Sine and cosine of an angle [rad]."""
+    n = floor(x * (2.0 / math.pi) + 0.5)
+    r = x - n * _HALF_PI[0]
+    r = r - n * _HALF_PI[1]
+    r = r - n * _HALF_PI[2]
+    z = r * r
+    s = 1.58962301576546568060e-10 * z - 2.50507477628578072866e-8
+    s = s * z + 2.75573136213857245213e-6
+    s = s * z - 1.98412698295895385996e-4
+    s = s * z + 8.33333333332211858878e-3
+    s = s * z - 1.66666666666666307295e-1
+    s = r + r * z * s
+    c = -1.13585365213876817300e-11 * z + 2.08757008419747316778e-9
+    c = c * z - 2.75573141792967388112e-7
+    c = c * z + 2.48015872888517045348e-5
+    c = c * z - 1.38888888888730564116e-3
+    c = c * z + 4.16666666666665929218e-2
+    c = 1.0 - 0.5 * z + z * z * c
+    # The quadrant n mod 4: odd ones exchange the two, 2 and 3 turn the sine, 1 and 2 the cosine.
+    half = n * 0.5
+    odd = half - floor(half)  # 0 or 1/2
+    quarter = n * 0.25
+    turn = quarter - floor(quarter)  # 0, 1/4, 1/2, 3/4
+    sine = where_less(odd, 0.25, s, c)
+    cosine = where_less(odd, 0.25, c, s)
+    sine = where_less(turn, 0.49, sine, -sine)
+    cosine = where_less(magnitude(turn - 0.375), 0.2, -cosine, cosine)
+    return sine, cosine
+
+
+@compiled
+def load3(W: Any, row: int) -> Vector:
+    """Three rows as a vector."""
+    return load(W, row), load(W, row + 1), load(W, row + 2)
+
+
+@compiled
+def store3(W: Any, row: int, a: Vector) -> None:
+    """A vector into three rows."""
+    store(W, row, a[0])
+    store(W, row + 1, a[1])
+    store(W, row + 2, a[2])
+
+
+@compiled
+def add3(a: Vector, b: Vector) -> Vector:
+    """a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@compiled
+def sub3(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@compiled
+def scale3(s: Value, a: Vector) -> Vector:
+    """s a."""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@compiled
+def dot3(a: Vector, b: Vector) -> Value:
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def cross3(a: Vector, b: Vector) -> Vector:
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def across(W: Any, row: int, a: Vector) -> Vector:
+    """R a, the columns of R in nine rows."""
+    return add3(
+        add3(scale3(a[0], load3(W, row)), scale3(a[1], load3(W, row + 3))),
+        scale3(a[2], load3(W, row + 6)),
+    )
+
+
+@compiled
+def along(W: Any, row: int, a: Vector) -> Vector:
+    """R' a, the columns of R in nine rows."""
+    return dot3(load3(W, row), a), dot3(load3(W, row + 3), a), dot3(load3(W, row + 6), a)

@@ -1,0 +1,100 @@
+"""Tangents: the projection of gradients onto the admissible motions.
+
+The contact Jacobian's rows are spanned by (0, Q) and (1, D), base first. Taking Q off D leaves
+(1, C) with C = (1 - Q Q') D, orthogonal to the former and well conditioned whatever the posture:
+its Gram matrix is 1 + C' C >= 1. So the projection of a gradient (u, g) is
+
+    g -= Q Q' g;   (u, g) -= (1, C) (1 + C' C)^-1 (u + C' g).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from copsense.batch.lanes import compiled, cross3, dot3, load, load3, root, splat, store, store3
+from copsense.batch.layout import Feet, Tree
+from copsense.batch.rows import Rows
+
+
+@compiled
+def span(feet: Feet, rows: Rows, W: Any) -> None:
+    """C, and the Cholesky factor of 1 + C' C."""
+    ns = len(feet.support)
+    for j in range(6):
+        c = rows.C + ns * j
+        for t in range(ns):
+            store(W, c + t, load(W, rows.held_row + 6 * t + j))
+        _remove(W, rows.Q, feet.unknowns, c, ns)
+    for i in range(6):
+        for j in range(i + 1):
+            s = splat(W, 1.0 if i == j else 0.0)
+            for t in range(ns):
+                s = s + load(W, rows.C + ns * i + t) * load(W, rows.C + ns * j + t)
+            for k in range(j):
+                s = s - load(W, rows.L + 6 * i + k) * load(W, rows.L + 6 * j + k)
+            if i == j:
+                store(W, rows.L + 6 * i + i, 1.0 / root(s))  # the diagonal is kept inverted
+            else:
+                store(W, rows.L + 6 * i + j, s * load(W, rows.L + 6 * j + j))
+
+
+@compiled
+def _remove(W: Any, Q: int, r: int, g: int, ns: int) -> None:
+    """g -= Q Q' g, column by column (Q is orthonormal: the order does not matter)."""
+    for k in range(r):
+        q = Q + ns * k
+        c = load(W, q) * load(W, g)
+        for t in range(1, ns):
+            c = c + load(W, q + t) * load(W, g + t)
+        for t in range(ns):
+            store(W, g + t, load(W, g + t) - c * load(W, q + t))
+
+
+@compiled
+def project(feet: Feet, rows: Rows, W: Any, gradient: int, felt: int) -> None:
+    """Project a gradient (nv,), base part in world axes; `felt` holds it on the support joints."""
+    ns = len(feet.support)
+    _remove(W, rows.Q, feet.unknowns, felt, ns)
+    y = rows.six
+    for i in range(6):
+        s = load(W, gradient + i)
+        for t in range(ns):
+            s = s + load(W, rows.C + ns * i + t) * load(W, felt + t)
+        for k in range(i):
+            s = s - load(W, rows.L + 6 * i + k) * load(W, y + k)
+        store(W, y + i, s * load(W, rows.L + 6 * i + i))
+    for i in range(5, -1, -1):
+        s = load(W, y + i)
+        for k in range(i + 1, 6):
+            s = s - load(W, rows.L + 6 * k + i) * load(W, y + k)
+        store(W, y + i, s * load(W, rows.L + 6 * i + i))
+    for i in range(6):
+        c = load(W, y + i)
+        store(W, gradient + i, load(W, gradient + i) - c)
+        for t in range(ns):
+            store(W, felt + t, load(W, felt + t) - c * load(W, rows.C + ns * i + t))
+    for t in range(ns):
+        store(W, gradient + 5 + feet.support[t], load(W, felt + t))
+
+
+@compiled
+def level_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
+    """Projected gradients of h . t for the two level directions t: of the CoM, times the mass."""
+    n = len(tree.parent) - 1
+    for j in range(2):
+        t = (splat(W, tree.level[j, 0]), splat(W, tree.level[j, 1]), splat(W, tree.level[j, 2]))
+        at = rows.level + (n + 6) * j
+        store_base_and_joints(tree, rows, W, at, t)
+        for k in range(len(feet.support)):
+            store(W, rows.felt + k, load(W, at + 5 + feet.support[k]))
+        project(feet, rows, W, at, rows.felt)
+
+
+@compiled
+def store_base_and_joints(tree: Tree, rows: Rows, W: Any, at: int, u: Any) -> None:
+    """Gradient (nv,) of h . u at fixed u: the base in world axes, then the joints."""
+    m = tree.carried[0]
+    store3(W, at, (m * u[0], m * u[1], m * u[2]))
+    store3(W, at + 3, cross3(load3(W, rows.first_moment), u))
+    for i in range(1, len(tree.parent)):
+        store(W, at + 5 + i, dot3(load3(W, rows.moment_rate + 3 * i), u))

@@ -1,0 +1,160 @@
+"""Cluster: a plan's chunks on the workers of Dask Distributed.
+
+Workers get the plan once, and after that numbers of chunks; they write into the store themselves,
+and nothing but numbers comes back. A chunk that is evaluated twice, because its worker died before
+it could say so, is written twice with the same bits.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import pickle
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from copsense.errors import CopsenseError, InvalidInputError, MissingExtraError, SchedulerError
+from copsense.maps.evaluation import ChunkEvaluator
+from copsense.maps.plan import MapPlan
+from copsense.maps.store import MapStore, open_map
+
+_TIMEOUT = 5.0  # s for a scheduler to answer
+_AHEAD = 4  # chunks that are sent out for each thread of the workers
+
+
+@contextmanager
+def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """A Dask client of the scheduler at an address, or of workers started on this machine.
+
+    Raises:
+        InvalidInputError: both are given, or no worker.
+        MissingExtraError: Dask Distributed is not installed.
+        SchedulerError: nothing answers at the address.
+    """
+    if scheduler is not None and workers is not None:
+        raise InvalidInputError(
+            "both a scheduler and local workers are asked for. Give one of the two."
+        )
+    try:
+        import distributed
+    except ImportError:
+        raise MissingExtraError("distributed", "cluster", "a cluster") from None
+    if scheduler is not None:
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the error says it all
+        try:
+            # A thread of its own, since the caller's may have a loop that runs, as notebooks do.
+            with ThreadPoolExecutor(1) as thread:
+                thread.submit(asyncio.run, _answer(scheduler)).result()
+            client = distributed.Client(scheduler, timeout=_TIMEOUT)
+        except (OSError, ValueError, TimeoutError) as error:
+            late = f"no answer within {_TIMEOUT:g} s"
+            raise SchedulerError(
+                f"no Dask scheduler answers at {scheduler} ({str(error) or late}). Start one "
+                "with `dask scheduler`, and give the address it prints, such as "
+                "tcp://127.0.0.1:8786."
+            ) from None
+        with client:
+            yield client
+        return
+    if workers is None or workers != int(workers) or workers < 1:
+        raise InvalidInputError(f"there are {workers} local workers. Give a number from 1.")
+    with (
+        distributed.LocalCluster(
+            n_workers=int(workers),
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+async def _answer(scheduler: str) -> None:
+    """Ask a scheduler who it is: a client that finds nobody takes its time, and is loud."""
+    import distributed
+
+    async with distributed.rpc(scheduler) as there:
+        who = await asyncio.wait_for(there.identity(), _TIMEOUT)
+    if who.get("type") != "Scheduler":
+        raise ValueError(f"a {who.get('type')} is there")
+
+
+def evaluate_there(
+    client: Any,
+    plan: MapPlan,
+    store: MapStore,
+    pending: list[int],
+    report: Callable[[int], object],
+) -> None:
+    """Have the workers evaluate these chunks and write them into the store.
+
+    Raises:
+        SchedulerError: a worker cannot take part, or workers died over the same chunk.
+        OutputError: a worker does not see the store, or cannot write it.
+    """
+    import distributed
+
+    run, remaining = uuid.uuid4().hex, iter(pending)
+    # A task of its own: were the worker that holds it to die, another would make it again.
+    package = client.submit(
+        pickle.loads, pickle.dumps(pickle.dumps(plan)), key=f"copsense-plan-{run}"
+    )
+
+    def send() -> Any:
+        index = next(remaining, None)
+        if index is None:
+            return None
+        return client.submit(
+            evaluate_chunk,
+            package,
+            str(store.path.resolve()),
+            index,
+            key=f"copsense-chunk-{run}-{index}",
+        )
+
+    ahead = _AHEAD * max(sum(client.nthreads().values()), 1)
+    first = [future for future in (send() for _ in range(ahead)) if future is not None]
+    results = distributed.as_completed(first)
+    try:
+        for future in results:
+            report(future.result())
+            following = send()
+            if following is not None:
+                results.add(following)
+    except CopsenseError:
+        raise
+    except Exception as error:
+        raise SchedulerError(
+            f"the workers could not go on ({type(error).__name__}: {str(error)[:300]}). They need "
+            f"copsense with the same version and extras as here, and the folder {store.path}. The "
+            "chunks that are done are kept; run the same again to go on."
+        ) from None
+    finally:
+        client.cancel([*first, package])
+
+
+def evaluate_chunk(package: bytes, path: str, index: int) -> int:
+    """Evaluate one chunk on a worker and write it.
+
+    Returns:
+        The number of its postures.
+    """
+    from copsense.maps.mapping import write_chunk
+
+    evaluator, store = _prepared(package, path)
+    write_chunk(evaluator, store, index)
+    start, stop = evaluator.plan.bounds(index)
+    return stop - start
+
+
+@lru_cache(maxsize=2)
+def _prepared(package: bytes, path: str) -> tuple[ChunkEvaluator, MapStore]:
+    return ChunkEvaluator(pickle.loads(package)), open_map(Path(path))

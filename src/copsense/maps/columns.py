@@ -1,0 +1,137 @@
+"""Columns: what a map stores for each posture, its dimensions, units and meaning."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from copsense.batch import PostureChart
+from copsense.maps.plan import MapPlan
+from copsense.margins import MarginTable, margin_table
+from copsense.sweep import variable_name
+
+EVALUATED, UNREACHABLE, REFUSED, INFEASIBLE, UNSOLVED = range(5)
+# What became of a posture under a criterion, by its code in the column `status`.
+STATUS = ("evaluated", "unreachable", "refused", "infeasible", "unsolved")
+PENDING = 255  # not visited yet
+
+_EACH = ("posture", "criterion")
+
+
+@dataclass(frozen=True)
+class Column:
+    """An array of the store.
+
+    Attributes:
+        dims: its dimensions.
+        dtype: as NumPy names it, or ``"str"``.
+        units: of its numbers; empty where it has none.
+        meaning: in words.
+    """
+
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    meaning: str
+
+
+_COLUMNS = {
+    "status": Column(_EACH, "uint8", "", "what became of the posture; see flag_meanings"),
+    "reason": Column(_EACH, "str", "", "why it was not evaluated; empty if it was"),
+    "least_com_travel": Column(
+        _EACH,
+        "float32",
+        "m",
+        "first-order distance the centre of mass may move before the first "
+        "contact tips; negative where a centre of pressure is off its sole",
+    ),
+    "largest_com_gain": Column(
+        _EACH,
+        "float32",
+        "1",
+        "largest singular value, over the contacts, of d CoP / d CoM",
+    ),
+    "com_travel": Column(
+        (*_EACH, "contact"),
+        "float32",
+        "m",
+        "the same distance for each contact",
+    ),
+    "com_gain": Column(
+        (*_EACH, "contact", "axis", "com_direction"),
+        "float32",
+        "1",
+        "centre of pressure (contact axes) per centre of mass (world x, y)",
+    ),
+    "cop": Column((*_EACH, "contact", "axis"), "float32", "m", "centre of pressure, contact axes"),
+    "margin": Column(
+        (*_EACH, "contact"),
+        "float32",
+        "m",
+        "signed distance of the centre of pressure to the sole's nearest edge, positive inside",
+    ),
+    "load_share": Column((*_EACH, "contact"), "float32", "1", "normal force over the weight"),
+    "com": Column(("posture", "com_axis"), "float32", "m", "centre of mass, world axes"),
+}
+_LIMIT_MARGIN = Column(
+    (*_EACH, "limit"),
+    "float32",
+    "m (cop), N m (torque, torsion), N (others)",
+    "smallest distance of the criterion's own wrenches to the limits of each kind; negative where "
+    "the limits would clip them",
+)
+_CONFIGURATION = Column(
+    ("posture", "configuration_index"),
+    "float64",
+    "m, 1, rad",
+    "base position, quaternion (x, y, z, w), joints",
+)
+
+
+def coordinate_columns(plan: MapPlan) -> dict[str, Column]:
+    """A column for each of the map's coordinates, in their order."""
+    chart = PostureChart(plan.stance, plan.sampling.names)
+    taken = {*_COLUMNS, "limit_margin", "configuration", "done", "posture", "criterion", "contact"}
+    found: dict[str, Column] = {}
+    for name, unit in zip(chart.names, chart.units, strict=True):
+        plain = variable_name(name, taken | set(found))
+        found[plain] = Column(("posture",), "float64", unit, f"{name}, a coordinate of the map")
+    return found
+
+
+def columns(plan: MapPlan) -> dict[str, Column]:
+    """Every column that is written posture by posture, the coordinates first."""
+    found = coordinate_columns(plan) | _COLUMNS
+    if plan.limits is not None:
+        found["limit_margin"] = _LIMIT_MARGIN
+    if plan.configurations:
+        found["configuration"] = _CONFIGURATION
+    return found
+
+
+def labels(plan: MapPlan) -> dict[str, tuple[str, ...]]:
+    """What stands along each dimension but the postures'."""
+    found = {
+        "criterion": tuple(c.name for c in plan.criteria),
+        "contact": plan.stance.contact_names,
+        "axis": ("x", "y"),
+        "com_direction": ("x", "y"),
+        "com_axis": ("x", "y", "z"),
+    }
+    if plan.limits is not None:
+        found["limit"] = limit_kinds(margin_table(plan.stance, plan.limits))
+    if plan.configurations:
+        found["configuration_index"] = tuple(map(str, range(plan.stance.robot.model.nq)))
+    return found
+
+
+def limit_kinds(table: MarginTable) -> tuple[str, ...]:
+    """The kinds of limits that there are."""
+    return tuple(dict.fromkeys(table.kinds))
+
+
+def fill_value(column: Column) -> Any:
+    """What an array holds where nothing was written yet."""
+    return {"str": "", "uint8": PENDING}.get(column.dtype, np.nan)

@@ -1,0 +1,159 @@
+"""Mapping: evaluate a plan's chunks here or on a cluster, and go on where it was stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from contextlib import nullcontext
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError
+from copsense.limits import Limits
+from copsense.maps.evaluation import ChunkEvaluator
+from copsense.maps.plan import MapPlan
+from copsense.maps.reduction import reduce_chunk
+from copsense.maps.sampling import Sampling
+from copsense.maps.store import MapStore, check_store, create_map, open_map
+from copsense.maps.summary import MapSummary, summarise
+from copsense.stance import Stance
+
+Progress = Callable[[int], object]
+
+
+def map_postures(
+    stance: Stance,
+    sampling: Sampling,
+    criteria: Sequence[Criterion],
+    path: str | Path,
+    limits: Limits | None = None,
+    *,
+    chunk: int = 4096,
+    configurations: bool = False,
+    threads: int = 1,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> MapSummary:
+    """Evaluate criteria over a space of postures, into a Zarr store at `path`.
+
+    The store grows chunk by chunk, and memory does not grow with the number of postures. Called
+    again with the same arguments it goes on where it was stopped; the numbers are the same bits,
+    however often it was stopped and whoever evaluated the chunks. A posture that cannot be reached,
+    or whose wrenches break the limits, is a row with its status and its reason.
+
+    Args:
+        stance: robot, contacts, and what the coordinates not named keep.
+        sampling: a `Grid` or a `Sample` over coordinates of `copsense.batch.PostureChart`.
+        criteria: of distinct names.
+        path: of the store, ending in ``.zarr``; its folder must exist.
+        limits: asked of every posture by the QP, which takes milliseconds each; travels, gains
+            and margins remain those of the criterion's own wrenches.
+        chunk: postures that are evaluated, written and resumed as one.
+        configurations: store the configurations too.
+        threads: chunks that are evaluated at a time.
+        scheduler: address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, whose workers
+            see `path`; `threads` is then theirs to choose.
+        workers: start this many Dask workers on this machine instead.
+        progress: called with the number of postures that each finished chunk has, and at first
+            with those that were there already.
+
+    Returns:
+        The reductions over all postures.
+
+    Raises:
+        InvalidInputError: coordinates, criteria or limits that do not fit the stance.
+        UnknownNameError: a coordinate or a joint that does not exist.
+        OutputError: `path` holds something else, a map of other parameters (the message says what
+            differs), or cannot be written.
+        SchedulerError: the scheduler or its workers cannot be reached, or gave up.
+        MissingExtraError: Zarr or Dask is not installed.
+    """
+    if threads != int(threads) or threads < 1:
+        raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
+    plan = MapPlan(stance, tuple(criteria), sampling, limits, int(chunk), configurations)
+    where = check_store(path)
+    evaluator = ChunkEvaluator(plan)
+    report: Progress = progress or (lambda _: None)
+    if scheduler is None and workers is None:
+        store = create_map(where, plan)
+        _evaluate_here(evaluator, store, _pending(plan, store, report), int(threads), report)
+    else:
+        from copsense.maps.cluster import connect, evaluate_there
+
+        with connect(scheduler, workers) as client:
+            store = create_map(where, plan)
+            evaluate_there(client, plan, store, _pending(plan, store, report), report)
+    return summarise(store)
+
+
+def map_summary(path: str | Path) -> MapSummary:
+    """What the map at a path comes to, as far as it is done.
+
+    Raises:
+        OutputError: there is no map of copsense.
+    """
+    return summarise(open_map(path))
+
+
+def load_map(path: str | Path) -> xr.Dataset:
+    """Open a map as a dataset whose arrays are read when they are asked for.
+
+    A grid's postures stand in one row, ``posture``; ``dataset.set_index(posture=[...]).unstack()``
+    with the coordinates' names gives each its own dimension.
+
+    Raises:
+        OutputError: there is no map of copsense.
+    """
+    open_map(path)  # refuses what is none
+    return xr.open_zarr(Path(path), chunks=None)
+
+
+def _pending(plan: MapPlan, store: MapStore, report: Progress) -> list[int]:
+    done = store.done()
+    before = sum(_size(plan, int(i)) for i in np.flatnonzero(done))
+    if before:
+        report(before)
+    return [int(i) for i in np.flatnonzero(~done)]
+
+
+def _evaluate_here(
+    evaluator: ChunkEvaluator, store: MapStore, pending: list[int], threads: int, report: Progress
+) -> None:
+    """Chunks side by side in threads: one computes while another writes."""
+    plan, remaining = evaluator.plan, iter(pending)
+
+    def run(index: int) -> int:
+        write_chunk(evaluator, store, index)
+        return _size(plan, index)
+
+    with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:
+        if pool is None:
+            for index in remaining:
+                report(run(index))
+            return
+        running = {pool.submit(run, i) for i in islice(remaining, threads)}
+        try:
+            while running:
+                finished, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in finished:
+                    report(future.result())
+                running |= {pool.submit(run, i) for i in islice(remaining, len(finished))}
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+
+
+def write_chunk(evaluator: ChunkEvaluator, store: MapStore, index: int) -> None:
+    """Evaluate a chunk and write it, mark and all."""
+    found = evaluator.evaluate(index)
+    store.write(index, found, reduce_chunk(found, evaluator.plan.bounds(index)[0]))
+
+
+def _size(plan: MapPlan, index: int) -> int:
+    start, stop = plan.bounds(index)
+    return stop - start

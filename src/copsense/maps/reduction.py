@@ -1,0 +1,123 @@
+"""Reduction: what a map comes to, folded from parts that each chunk leaves behind.
+
+A chunk's part depends on that chunk alone, and parts are folded in the order of the chunks. So a
+map that was stopped, resumed, or shared among machines reduces to the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from copsense.maps.columns import EVALUATED, STATUS
+from copsense.maps.evaluation import Chunk
+
+WORST = 10  # postures of each chunk, and of the map, that are kept by name
+# column -> sign that puts the worst first in ascending order
+QUANTITIES = {"least_com_travel": 1.0, "largest_com_gain": -1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What one chunk contributes; folding two gives another.
+
+    Attributes:
+        counts: rows of each status (nk, ns).
+        worst: postures with the worst of each quantity, the worst first (nq, nk, w); -1 where
+            there are fewer.
+        values: the quantity there (nq, nk, w); NaN where there are fewer.
+    """
+
+    counts: Int[np.ndarray, "nk ns"]
+    worst: Int[np.ndarray, "nq nk w"]
+    values: Float[np.ndarray, "nq nk w"]
+
+
+def reduce_chunk(chunk: Chunk, start: int) -> Part:
+    """The part of a chunk whose first posture is `start`; rows not evaluated are only counted."""
+    status = chunk["status"]
+    counts = (status[..., None] == np.arange(len(STATUS))).sum(axis=0, dtype=np.int64)
+    rows = np.arange(start, start + len(status))
+    posture = np.where(status == EVALUATED, rows[:, None], -1)
+    worst, values = [], []
+    for name in QUANTITIES:
+        found = [_first(name, posture[:, j], chunk[name][:, j]) for j in range(status.shape[1])]
+        worst.append([p for p, _ in found])
+        values.append([v for _, v in found])
+    return Part(counts, np.array(worst, dtype=np.int64), np.array(values, dtype=np.float32))
+
+
+def fold(one: Part, other: Part) -> Part:
+    """Both parts together."""
+    postures = np.concatenate([one.worst, other.worst], axis=-1)
+    values = np.concatenate([one.values, other.values], axis=-1)
+    worst, kept = np.empty_like(one.worst), np.empty_like(one.values)
+    for i, name in enumerate(QUANTITIES):
+        for j in range(worst.shape[1]):
+            worst[i, j], kept[i, j] = _first(name, postures[i, j], values[i, j])
+    return Part(one.counts + other.counts, worst, kept)
+
+
+def _first(name: str, postures: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The WORST first postures by value, then by number."""
+    known = np.flatnonzero((postures >= 0) & ~np.isnan(values))
+    signed = QUANTITIES[name] * values[known]
+    if len(known) > 4 * WORST:  # a whole chunk is not sorted for ten of it
+        near = signed <= np.partition(signed, WORST - 1)[WORST - 1]
+        known, signed = known[near], signed[near]
+    order = known[np.lexsort((postures[known], signed))][:WORST]
+    best, kept = np.full(WORST, -1, dtype=np.int64), np.full(WORST, np.nan, dtype=np.float32)
+    best[: len(order)], kept[: len(order)] = postures[order], values[order]
+    return best, kept
+
+
+def percentiles(
+    chunks: Callable[[], Iterable[np.ndarray]], levels: Sequence[float]
+) -> Float[np.ndarray, " p"]:
+    """Exact percentiles of float32 numbers that are read chunk by chunk, twice.
+
+    The first reading counts by the upper 16 bits of an order-preserving key, the second by the
+    lower 16 bits where a percentile falls: half a megabyte a percentile, however many the numbers.
+
+    Args:
+        chunks: gives the numbers from the start each time; NaN is passed over.
+        levels: in percent.
+
+    Returns:
+        The smallest number that at least this share does not exceed (no interpolation); NaN where
+        there is none.
+    """
+    upper = np.zeros(1 << 16, dtype=np.int64)
+    for values in chunks():
+        upper += np.bincount(_keys(values) >> 16, minlength=1 << 16)
+    total = int(upper.sum())
+    if not total:
+        return np.full(len(levels), np.nan)
+    ranks = np.array([max(int(np.ceil(level / 100 * total)), 1) for level in levels])
+    cumulative = np.cumsum(upper)
+    high = np.searchsorted(cumulative, ranks)
+    lower = {int(h): np.zeros(1 << 16, dtype=np.int64) for h in high}
+    for values in chunks():
+        keys = _keys(values)
+        for h, counts in lower.items():
+            counts += np.bincount(keys[keys >> 16 == h] & 0xFFFF, minlength=1 << 16)
+    found = [
+        (int(h) << 16)
+        + int(np.searchsorted(np.cumsum(lower[int(h)]), rank - cumulative[h] + upper[h]))
+        for h, rank in zip(high, ranks, strict=True)
+    ]
+    return _values(np.array(found, dtype=np.uint32))
+
+
+def _keys(values: np.ndarray) -> np.ndarray:
+    """Unsigned integers in the order of float32 numbers; NaN left out."""
+    bits = np.asarray(values, dtype=np.float32)[~np.isnan(values)].view(np.uint32)
+    return np.where(bits >> 31, ~bits, bits | np.uint32(1 << 31)).astype(np.int64)
+
+
+def _values(keys: np.ndarray) -> np.ndarray:
+    bits = np.where(keys >> 31, keys & np.uint32(0x7FFFFFFF), ~keys)
+    return np.asarray(bits.astype(np.uint32).view(np.float32), dtype=float)

@@ -1,0 +1,304 @@
+"""Store: a map on disk, a Zarr group that `xarray.open_zarr` opens, written chunk by chunk.
+
+Layout (Zarr format 3). Each column is an array whose first dimension is ``posture``; a chunk of the
+map is one Zarr chunk of every column, so that nobody writes into another's files. ``done`` has one
+entry for each chunk, written last: a chunk without it is evaluated anew. The group ``parts`` holds
+what each chunk contributes to the reductions. The root's attributes hold the parameters.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from copsense._version import __version__
+from copsense.errors import CopsenseError, MissingExtraError, OutputError
+from copsense.maps.columns import (
+    EVALUATED,
+    PENDING,
+    STATUS,
+    Column,
+    columns,
+    coordinate_columns,
+    fill_value,
+    labels,
+)
+from copsense.maps.evaluation import Chunk
+from copsense.maps.plan import MapPlan, differences, digest, worded
+from copsense.maps.reduction import QUANTITIES, WORST, Part
+from copsense.storage import check_output
+
+_PARAMETERS = "copsense_map"  # the attribute by which a store is known
+_SUFFIX = ".zarr"
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+
+
+class MapStore:
+    """A map on disk, open for reading and for writing whole chunks.
+
+    Attributes:
+        path: of its folder.
+        parameters: what decides its numbers.
+        coordinates: columns of the coordinates.
+    """
+
+    def __init__(self, path: Path, group: Any) -> None:
+        """Take hold of an open group; use `open_map` or `create_map`."""
+        self.path, self._group = path, group
+        self.parameters: dict[str, Any] = json.loads(group.attrs[_PARAMETERS])
+        self.coordinates: tuple[str, ...] = tuple(group.attrs["over"])
+        self._arrays = dict(group.arrays())
+        self._parts = dict(group["parts"].arrays())
+        self._size = int(self.parameters["chunk"])
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the root."""
+        return dict(self._group.attrs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates, of which `coordinates` are the columns."""
+        return tuple(axis["name"] for axis in self.parameters["sampling"]["axes"])
+
+    @property
+    def criteria(self) -> tuple[str, ...]:
+        """Names of the criteria."""
+        return tuple(c["name"] for c in self.parameters["criteria"])
+
+    def units(self, column: str) -> str:
+        """Units of a column."""
+        return str(self._arrays[column].attrs.get("units", ""))
+
+    def __len__(self) -> int:
+        """Number of postures."""
+        return int(self._arrays["status"].shape[0])
+
+    def done(self) -> np.ndarray:
+        """Which chunks are written (chunks,)."""
+        with self._errors("be read"):
+            return np.asarray(self._arrays["done"][:]).astype(bool)
+
+    def read(self, column: str, start: int, stop: int) -> np.ndarray:
+        """Rows of a column."""
+        with self._errors("be read"):
+            return np.asarray(self._arrays[column][start:stop])
+
+    def chunks(self, column: str, criterion: int) -> Iterator[np.ndarray]:
+        """A column of the postures that were evaluated, for one criterion, chunk by chunk."""
+        for i in np.flatnonzero(self.done()):
+            start = int(i) * self._size
+            stop = min(start + self._size, len(self))
+            status = self.read("status", start, stop)[:, criterion]
+            yield self.read(column, start, stop)[:, criterion][status == EVALUATED]
+
+    def write(self, index: int, chunk: Chunk, part: Part) -> None:
+        """Write a chunk; its mark comes last, so a chunk that is marked is whole.
+
+        Raises:
+            OutputError: the disk is full, or cannot be written.
+        """
+        start = index * self._size
+        with self._errors("be written"):
+            for name, rows in chunk.items():
+                if name != "reason" or (rows != "").any():  # nothing stored reads as empty
+                    self._arrays[name][start : start + len(rows)] = rows
+            for name in ("counts", "worst", "values"):
+                self._parts[name][index] = getattr(part, name)
+            self._arrays["done"][index] = 1
+
+    def part(self, index: int) -> Part:
+        """What a chunk contributes to the reductions."""
+        with self._errors("be read"):
+            return Part(*(np.asarray(self._parts[n][index]) for n in ("counts", "worst", "values")))
+
+    @contextmanager
+    def _errors(self, verb: str) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            reason = error.strerror or str(error)
+            full = error.errno in _FULL
+            raise OutputError(
+                f"the map {self.path} cannot {verb}: {reason}. The chunks that are done are kept; "
+                f"{'free some space' if full else 'make it accessible'}, and run the same again "
+                "to go on."
+            ) from None
+
+
+def check_store(path: str | Path) -> Path:
+    """A path where a map is or can be made, checked before the work starts.
+
+    Raises:
+        InvalidInputError: a path without ``.zarr``.
+        OutputError: something else is there, or nothing can be written there.
+        MissingExtraError: Zarr is not installed.
+    """
+    _zarr()
+    path = Path(path)
+    try:
+        there = path.exists() or path.is_symlink()
+    except (OSError, ValueError):
+        there = False
+    if there:
+        open_map(path)
+        return path
+    return check_output(path, suffixes=(_SUFFIX,), overwrite=False)
+
+
+def open_map(path: str | Path) -> MapStore:
+    """Open a map to read it, or to write more chunks.
+
+    Raises:
+        OutputError: nothing is there, or no map of this version of copsense.
+    """
+    zarr, path = _zarr(), Path(path)
+    no_map = f"{str(path)[:300]} is no map of copsense"
+    remedy = "It was not touched. Give another path, such as map.zarr."
+    try:
+        if not path.exists():
+            raise OutputError(f"there is no map at {path}. Make one with: copsense map ROBOT ...")
+        if not (path / "zarr.json").is_file():
+            raise OutputError(f"{no_map}: it has no zarr.json. {remedy}")
+        group = zarr.open_group(path, mode="r+", zarr_format=3)
+        if _PARAMETERS not in group.attrs:
+            raise OutputError(f"{no_map}: what made it left no parameters. {remedy}")
+        return MapStore(path, group)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        if isinstance(error, CopsenseError):
+            raise
+        raise OutputError(f"{no_map} that can be read: {error}. {remedy}") from None
+
+
+def create_map(path: Path, plan: MapPlan) -> MapStore:
+    """Make an empty store beside its place and move it there, whole; or open what is there.
+
+    Raises:
+        OutputError: the store that is there is of another plan; or none can be made.
+    """
+    parameters = plan.parameters()
+    if path.exists():
+        return _resumed(path, parameters)
+    try:
+        made = Path(tempfile.mkdtemp(dir=path.parent, prefix=".copsense-", suffix=_SUFFIX))
+        try:
+            made.chmod(0o777 & ~_mask())
+            _lay_out(made, plan, parameters)
+            made.rename(path)
+        finally:
+            shutil.rmtree(made, ignore_errors=True)
+    except OSError as error:
+        if path.exists():  # somebody was faster
+            return _resumed(path, parameters)
+        raise OutputError(
+            f"{str(path)[:300]!r} cannot be written: {error.strerror or error}. Free some space, "
+            "or choose another path."
+        ) from None
+    return open_map(path)
+
+
+def _resumed(path: Path, parameters: dict[str, Any]) -> MapStore:
+    store = open_map(path)
+    found = differences(store.parameters, json.loads(json.dumps(parameters)))
+    if found:
+        raise OutputError(
+            f"{path} is a map of other parameters: {worded(found)}. It was not touched. Give the "
+            "same parameters to go on with it, or another path."
+        )
+    return store
+
+
+def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
+    """Every array, empty, and the metadata in one place."""
+    zarr, count = _zarr(), len(plan.sampling)
+    coordinates = coordinate_columns(plan)
+    names = labels(plan)
+    sizes = {dim: len(found) for dim, found in names.items()} | {"posture": count}
+    group = zarr.create_group(
+        path,
+        zarr_format=3,
+        attributes={
+            "title": f"Map of {plan.stance.robot.name}: static centre-of-pressure sensitivity",
+            "source": f"copsense {__version__}",
+            "robot": plan.stance.robot.name,
+            "over": list(coordinates),
+            "coordinates": " ".join(coordinates),  # as xarray reads it
+            "digest": digest(parameters),
+            _PARAMETERS: json.dumps(parameters),
+            "conventions": "SI units, radians, world z up; float32 but for coordinates and "
+            "configurations",
+        },
+    )
+
+    def add(where: Any, name: str, column: Column, chunks: tuple[int, ...]) -> Any:
+        attributes: dict[str, Any] = {"long_name": column.meaning}
+        if column.units:
+            attributes["units"] = column.units
+        return where.create_array(
+            name,
+            shape=tuple(sizes[d] for d in column.dims),
+            chunks=chunks,
+            dtype=str if column.dtype == "str" else column.dtype,
+            fill_value=fill_value(column) if column.dtype != "int64" else -1,
+            dimension_names=column.dims,
+            attributes=attributes,
+            # Noise in the last bits: compressing a float costs more than it saves.
+            compressors="auto" if column.dtype in ("str", "int64", "uint8") else None,
+        )
+
+    for name, column in columns(plan).items():
+        inner = tuple(sizes[d] for d in column.dims[1:])
+        array = add(group, name, column, (min(plan.chunk, count), *inner))
+        if name == "status":
+            array.attrs["flag_values"] = [*range(len(STATUS)), PENDING]
+            array.attrs["flag_meanings"] = " ".join([*STATUS, "pending"])
+    for dim, found in names.items():
+        array = add(group, dim, Column((dim,), "str", "", dim.replace("_", " ")), (len(found),))
+        array[:] = np.array(found, dtype=object)
+    sizes |= {"chunk": plan.chunks, "code": len(STATUS), "quantity": len(QUANTITIES), "rank": WORST}
+    mark = Column(("chunk",), "uint8", "", "1 where the chunk is written, which is done last")
+    group.create_array(
+        "done",
+        shape=(plan.chunks,),
+        chunks=(1,),
+        dtype="uint8",
+        fill_value=0,
+        dimension_names=mark.dims,
+        attributes={"long_name": mark.meaning},
+    )
+    parts = group.create_group("parts")
+    nk, nq = sizes["criterion"], len(QUANTITIES)
+    dims = ("chunk", "quantity", "criterion", "rank")
+    counts = Column(("chunk", "criterion", "code"), "int64", "", "rows of each status")
+    add(parts, "counts", counts, (1, nk, len(STATUS)))
+    add(parts, "worst", Column(dims, "int64", "", "the worst postures"), (1, nq, nk, WORST))
+    add(parts, "values", Column(dims, "float32", "", "the quantity there"), (1, nq, nk, WORST))
+    with warnings.catch_warnings():
+        # Not of the specification yet; readers that do not know it read array by array.
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        zarr.consolidate_metadata(path)
+
+
+def _mask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _zarr() -> ModuleType:
+    try:
+        import zarr
+    except ImportError:
+        raise MissingExtraError("zarr", "map", "a map") from None
+    return zarr

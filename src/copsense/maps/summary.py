@@ -1,0 +1,125 @@
+"""Summary: what a whole map comes to, in a few numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from copsense.maps.columns import STATUS
+from copsense.maps.reduction import QUANTITIES, fold, percentiles
+from copsense.maps.store import MapStore
+
+LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
+
+
+@dataclass(frozen=True)
+class WorstPosture:
+    """A posture that is among the worst.
+
+    Attributes:
+        posture: its number.
+        coordinates: where it is, by name [m, rad].
+        value: of the quantity there [m, or 1 for a gain].
+    """
+
+    posture: int
+    coordinates: Mapping[str, float]
+    value: float
+
+
+@dataclass(frozen=True)
+class CriterionSummary:
+    """A map under one criterion.
+
+    Attributes:
+        counts: postures of each status.
+        worst_travel: the least CoM travels, the worst first.
+        worst_gain: the largest CoM gains, the worst first.
+        travel_percentiles: percent -> the least CoM travel [m] that this share of the evaluated
+            postures does not exceed.
+        gain_percentiles: the same of the largest CoM gain.
+    """
+
+    counts: Mapping[str, int]
+    worst_travel: tuple[WorstPosture, ...]
+    worst_gain: tuple[WorstPosture, ...]
+    travel_percentiles: Mapping[float, float]
+    gain_percentiles: Mapping[float, float]
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """A map in a few numbers.
+
+    Attributes:
+        path: of the store.
+        robot: its name.
+        coordinates: what was mapped over.
+        units: of these.
+        postures: in all.
+        chunks: in all.
+        chunks_done: evaluated so far; the numbers are of these.
+        criteria: by name.
+    """
+
+    path: str
+    robot: str
+    coordinates: tuple[str, ...]
+    units: tuple[str, ...]
+    postures: int
+    chunks: int
+    chunks_done: int
+    criteria: Mapping[str, CriterionSummary]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every chunk is done."""
+        return self.chunks_done == self.chunks
+
+
+def summarise(store: MapStore) -> MapSummary:
+    """Fold the parts of the chunks that are done, in their order."""
+    done = store.done()
+    total = None
+    for i in np.flatnonzero(done):
+        part = store.part(int(i))
+        total = part if total is None else fold(total, part)
+    criteria = {}
+    for j, criterion in enumerate(store.criteria):
+        shares: dict[str, dict[float, float]] = {}
+        worst: dict[str, tuple[WorstPosture, ...]] = {}
+        for k, name in enumerate(QUANTITIES):
+            found = percentiles(lambda n=name, c=j: store.chunks(n, c), LEVELS)  # type: ignore[misc]
+            shares[name] = dict(zip(LEVELS, found.tolist(), strict=True))
+            worst[name] = ()
+            if total is not None:
+                rows = zip(total.worst[k, j], total.values[k, j], strict=True)
+                worst[name] = tuple(_posture(store, int(p), float(v)) for p, v in rows if p >= 0)
+        counts = np.zeros(len(STATUS), int) if total is None else total.counts[j]
+        criteria[criterion] = CriterionSummary(
+            dict(zip(STATUS, counts.tolist(), strict=True)),
+            worst["least_com_travel"],
+            worst["largest_com_gain"],
+            shares["least_com_travel"],
+            shares["largest_com_gain"],
+        )
+    return MapSummary(
+        str(store.path),
+        str(store.parameters["robot"]["name"]),
+        store.names,
+        tuple(store.units(name) for name in store.coordinates),
+        len(store),
+        len(done),
+        int(done.sum()),
+        criteria,
+    )
+
+
+def _posture(store: MapStore, row: int, value: float) -> WorstPosture:
+    where = {
+        name: float(store.read(column, row, row + 1)[0])
+        for name, column in zip(store.names, store.coordinates, strict=True)
+    }
+    return WorstPosture(row, where, value)

@@ -1,0 +1,134 @@
+"""plot_map: a space of postures over two coordinates, criteria side by side, and the worst."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from copsense.errors import InvalidInputError
+from copsense.maps.marginal import Marginal
+from copsense.plots.reading import MM
+from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
+
+# quantity -> (words, unit shown, factor, format of a contour's label)
+_SHOWN = {
+    "least_com_travel": ("CoM travel", "mm", MM, "%.0f"),
+    "largest_com_gain": ("CoM gain", "m/m", 1.0, "%.2f"),
+}
+_LEVELS = 7  # contour lines
+_SHADES = (1.0, 0.55, 0.3)  # of the worst posture, the next and the one after
+
+
+@styled
+def plot_map(
+    marginals: Sequence[Marginal],
+    worst: Mapping[str, Sequence[Float[np.ndarray, "s 2 3"]]] | None = None,
+) -> Figure:
+    """Draw quantities of a map over two coordinates: heat maps with contour lines.
+
+    A row for each quantity, a column for each criterion, and the difference of the first two. Cells
+    in which no posture was evaluated stay pale. Under them, seen from the front, the worst
+    postures.
+
+    Args:
+        marginals: what `copsense.maps.marginal` gives, of the same map and criteria.
+        worst: criterion -> skeletons of its worst postures, the worst first, as
+            `copsense.maps.skeleton` gives them; three are drawn.
+
+    Raises:
+        InvalidInputError: no marginal, or of different criteria.
+    """
+    if not marginals or len({m.criteria for m in marginals}) != 1:
+        raise InvalidInputError(
+            "plot_map needs marginals of one map: [marginal(load_map(path), quantity=...), ...]."
+        )
+    criteria = marginals[0].criteria
+    columns = len(criteria) + (len(criteria) > 1)
+    rows = len(marginals) + bool(worst)
+    figure = new_figure(3.7 * columns + 0.6, 3.1 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axes, here in zip(grid, marginals, strict=False):
+        _draw_row(figure, axes, here)
+    for ax, name in zip(grid[-1] if worst else (), criteria, strict=False):
+        _draw_postures(ax, name, list((worst or {}).get(name, ())))
+    if worst and columns > len(criteria):
+        grid[-1, -1].set_axis_off()
+    return figure
+
+
+def _draw_row(figure: Figure, axes: np.ndarray, here: Marginal) -> None:
+    words, unit, factor, text = _SHOWN[here.quantity]
+    values = here.values * factor
+    shown = np.where(np.isfinite(values), values, np.nan)
+    low, high = _range(shown)
+    for ax, name, cells in zip(axes, here.criteria, shown, strict=False):
+        mesh = _heat(ax, here, cells, text, cmap="viridis", vmin=low, vmax=high)
+        ax.set_title(f"{name}: {here.how} {words}", fontsize=9)
+    bar = figure.colorbar(mesh, ax=list(axes[: len(shown)]), aspect=30)
+    bar.set_label(f"{words} [{unit}]")
+    if len(shown) > 1:
+        ax, change = axes[-1], shown[1] - shown[0]
+        reach = max(abs(v) for v in _range(change)) or 1.0
+        mesh = _heat(ax, here, change, text, cmap="RdBu", vmin=-reach, vmax=reach)
+        ax.set_title(f"{here.criteria[1]} less {here.criteria[0]}", fontsize=9)
+        figure.colorbar(mesh, ax=ax, aspect=30).set_label(f"difference [{unit}]")
+
+
+def _heat(ax: Axes, here: Marginal, cells: np.ndarray, text: str, **colour: Any) -> Any:
+    """Cells in colour, and contour lines through their middles."""
+    edges = [
+        np.degrees(e) if unit == "rad" else e * MM
+        for e, unit in zip(here.edges, here.units, strict=True)
+    ]
+    middles = [(e[1:] + e[:-1]) / 2 for e in edges]
+    ax.set_facecolor(BAD)
+    ax.grid(visible=False)
+    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(cells.T), shading="flat", **colour)
+    mesh.set_rasterized(True)
+    known = cells[np.isfinite(cells)]
+    # The same levels in a row: what is flat beside the other has no line.
+    levels = MaxNLocator(_LEVELS).tick_values(colour["vmin"], colour["vmax"])
+    crossed = [
+        level for level in levels if known.min(initial=np.inf) < level < known.max(initial=-np.inf)
+    ]
+    if min(cells.shape) > 1 and crossed:
+        ink = "white" if colour["cmap"] == "viridis" else INK
+        lines = ax.contour(
+            *middles, np.ma.masked_invalid(cells.T), levels=crossed, colors=ink, linewidths=0.7
+        )
+        ax.clabel(lines, fmt=text, fontsize=7)
+    words = [
+        f"{name} [{'deg' if unit == 'rad' else 'mm'}]"
+        for name, unit in zip(here.names, here.units, strict=True)
+    ]
+    ax.set_xlabel(words[0])
+    ax.set_ylabel(words[1])
+    return mesh
+
+
+def _draw_postures(ax: Axes, name: str, skeletons: Sequence[np.ndarray]) -> None:
+    """Skeletons in the frontal plane, as one who stands before the robot sees them."""
+    for lines, shade in zip(skeletons[: len(_SHADES)], _SHADES, strict=False):
+        for segment in lines:
+            ax.plot(segment[:, 1], segment[:, 2], color=INK, alpha=shade, linewidth=1.6)
+    ax.axhline(0.0, color=MUTED, linewidth=COM_LINE["linewidth"])
+    ax.set_aspect("equal", adjustable="datalim")
+    ax.set_title(f"{name}: postures of least travel", fontsize=9)
+    ax.set_xlabel("world y [m]")
+    ax.set_ylabel("world z [m]")
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    """Least and largest number; zero to one where there is none."""
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    return low, high if high > low else math.nextafter(low, math.inf)

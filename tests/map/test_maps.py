@@ -1,0 +1,175 @@
+"""A map holds what one posture at a time gives, however it was cut, stopped and resumed."""
+
+import re
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import copsense
+from copsense.batch import PostureChart
+from copsense.errors import CopsenseError
+from copsense.maps import Axis, Grid
+
+NEAR = 2e-6  # float32 against the clear path
+
+
+def test_rows_are_those_of_the_clear_path(whole, icub, both, sample):
+    dataset = copsense.load_map(whole[0])
+    postures = PostureChart(icub, sample.names).solve(sample.values(0, len(sample)))
+    rows = np.flatnonzero(postures.converged)[:: len(sample) // 12]
+    assert len(rows) > 5
+    for row in rows:
+        here = icub.at(postures.configurations[row])
+        for j, criterion in enumerate(both):
+            expected = copsense.cop_sensitivity(here, criterion)
+            found = dataset.isel(posture=row, criterion=j)
+            gains = np.linalg.norm(expected.com_gain, 2, axis=(1, 2))
+            for name, value in {
+                "cop": expected.cop,
+                "com_gain": expected.com_gain,
+                "com_travel": expected.com_travel,
+                "least_com_travel": expected.com_travel.min(),
+                "largest_com_gain": gains.max(),
+                "com": here.com,
+            }.items():
+                assert np.allclose(found[name].values, value, rtol=NEAR, atol=NEAR), name
+
+
+def test_coordinates_are_where_the_postures_are(whole):
+    dataset = copsense.load_map(whole[0])
+    there = (dataset["status"] == 0).all("criterion").values
+    assert np.allclose(dataset["com_y"].values[there], dataset["com"].values[there, 1], atol=1e-7)
+    assert np.allclose(dataset["com_z"].values[there], dataset["com"].values[there, 2], atol=1e-7)
+
+
+def test_a_posture_out_of_reach_is_a_row_with_its_reason(whole):
+    dataset = copsense.load_map(whole[0])
+    lost = (dataset["status"] == 1).values
+    assert 0 < lost.sum() < lost.size
+    assert (dataset["reason"].values != "")[lost].all()
+    assert (dataset["reason"].values == "")[~lost].all()
+    assert np.isnan(dataset["com_travel"].values[lost]).all()
+    assert np.isfinite(dataset["com_travel"].values[~lost]).all()
+
+
+def test_xarray_opens_the_store_by_itself(whole):
+    dataset = xr.open_zarr(whole[0], chunks=None)
+    assert set(dataset.coords) >= {"com_y", "com_z", "roll", "criterion", "contact"}
+    assert dataset["com_travel"].dims == ("posture", "criterion", "contact")
+    assert dataset["com_z"].attrs["units"] == "m"
+    assert dataset["roll"].attrs["units"] == "rad"
+    assert all("units" in v.attrs for v in dataset.values() if v.dtype.kind == "f")
+    one = dataset["least_com_travel"].sel(criterion="minimum-torque")
+    assert one.dtype == np.float32
+    assert bool(dataset["done"].all())
+
+
+def test_a_grid_unstacks_into_its_axes(icub, both, grid, tmp_path):
+    copsense.map_postures(icub, grid, both, tmp_path / "m.zarr", chunk=50)
+    dataset = copsense.load_map(tmp_path / "m.zarr")
+    cube = dataset["com"].set_index(posture=list(grid.names)).unstack("posture")
+    assert [cube.sizes[name] for name in grid.names] == list(grid.shape)
+
+
+def test_a_map_resumed_or_cut_among_threads_is_the_same_bits(
+    whole, icub, both, sample, tmp_path, same
+):
+    path, seen = tmp_path / "m.zarr", []
+
+    class StopError(Exception):
+        pass
+
+    def stop(count):
+        seen.append(count)
+        if len(seen) == 3:
+            raise StopError
+
+    with pytest.raises(StopError):
+        copsense.map_postures(icub, sample, both, path, chunk=32, progress=stop)
+    partial = copsense.map_summary(path)
+    assert (partial.chunks_done, partial.complete) == (3, False)
+    resumed = []
+    found = copsense.map_postures(
+        icub, sample, both, path, chunk=32, threads=3, progress=resumed.append
+    )
+    assert resumed[0] == 3 * 32
+    assert sum(resumed) == len(sample)
+    assert found.complete
+    assert same(path, whole[0])
+    assert vars(found) | {"path": ""} == vars(whole[1]) | {"path": ""}
+
+
+def test_a_chunk_without_its_mark_is_evaluated_anew(icub, both, sample, whole, tmp_path, same):
+    import shutil
+
+    import zarr
+
+    path = tmp_path / "m.zarr"
+    shutil.copytree(whole[0], path)
+    group = zarr.open_group(path, mode="r+")
+    group["done"][4], group["com_travel"][4 * 32 : 4 * 32 + 7] = 0, 123.0
+    copsense.map_postures(icub, sample, both, path, chunk=32)
+    assert same(path, whole[0])
+
+
+def test_values_do_not_depend_on_the_chunks(whole, icub, both, sample, tmp_path):
+    found = copsense.map_postures(icub, sample, both, tmp_path / "m.zarr", chunk=101)
+    one, other = copsense.load_map(whole[0]), copsense.load_map(tmp_path / "m.zarr")
+    for name in ("least_com_travel", "com_gain", "cop", "status", "com_y"):
+        assert one[name].values.tobytes() == other[name].values.tobytes(), name
+    assert found.criteria == whole[1].criteria
+
+
+def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
+    z = float(icub.com[2]) - 0.02
+    grid = Grid((Axis("com_z", z, z, 1), Axis("com_x", -0.08, 0.12, 9)))
+    limits = copsense.Limits(friction=0.3, cop_margin=0.02)
+    path = tmp_path / "m.zarr"
+    copsense.map_postures(icub, grid, both, path, limits, configurations=True)
+    dataset = copsense.load_map(path)
+    statuses = dataset["status"].values
+    assert (statuses == 0).any()
+    assert (statuses == 3).any()
+    for row, q in enumerate(dataset["configuration"].values):
+        for j, criterion in enumerate(both):
+            if statuses[row, j] == 1:
+                continue
+            here = icub.at(q)
+            own = copsense.solve_equilibrium(here, criterion)
+            nearest = min(m.value for m in copsense.limit_margins(own, limits) if m.kind == "cop")
+            found = dataset["limit_margin"].sel(limit="cop").values[row, j]
+            assert found == pytest.approx(nearest, rel=1e-5, abs=1e-6)
+            reason = dataset["reason"].values[row, j]
+            if statuses[row, j] == 3:
+                with pytest.raises(copsense.CopsenseError, match=re.escape(reason)):
+                    copsense.solve_equilibrium(here, criterion, limits)
+            else:
+                assert reason == ""
+                copsense.solve_equilibrium(here, criterion, limits)
+
+
+def test_feet_and_joints_are_coordinates_too(icub, both, tmp_path):
+    names = ("l_sole:x", "torso_yaw")
+    here = dict(zip(names, PostureChart(icub, names).values, strict=True))
+    grid = Grid(tuple(Axis(n, v - 0.01, v + 0.01, 3) for n, v in here.items()))
+    found = copsense.map_postures(icub, grid, both, tmp_path / "m.zarr")
+    assert found.coordinates == names
+    assert found.units == ("m", "rad")
+    assert "l_sole_x" in copsense.load_map(tmp_path / "m.zarr").coords
+    assert found.criteria["minimum-torque"].counts["evaluated"] == 9
+
+
+def test_what_does_not_fit_is_refused_and_leaves_nothing(icub, both, sample, tmp_path):
+    path = tmp_path / "m.zarr"
+    bad = Grid((Axis("com_q", 0.0, 1.0, 2),))
+    for arguments, word in [
+        ((icub, bad, both, path), "com_q"),
+        ((icub, sample, [], path), "at least one"),
+        ((icub, sample, both, tmp_path / "m.nc"), "suffix"),
+        ((icub, sample, both, tmp_path / "no" / "m.zarr"), "no folder"),
+        ((icub, sample, both, path, copsense.Limits(torque={"elbow": 1.0})), "elbow"),
+    ]:
+        with pytest.raises(CopsenseError, match=word):
+            copsense.map_postures(*arguments)
+        assert not list(tmp_path.iterdir())
