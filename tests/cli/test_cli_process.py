@@ -10,7 +10,11 @@ from pathlib import Path
 import pytest
 
 ENTRY = "from copsense.cli import main; main()"
-COMMANDS = ("robots", "four-bar", "analyse", "sweep", "plot", "reproduce")
+COMMANDS = (
+    "robots", "four-bar", "analyse", "sweep", "plot", "map", "design", "balance", "benchmark",
+    "reproduce",
+)  # fmt: skip
+HEAVY = {"matplotlib", "jinja2", "netCDF4", "mujoco", "icub_models", "numba", "zarr", "distributed"}
 
 
 def run(*arguments, code=ENTRY, **options):
@@ -32,8 +36,7 @@ def test_help_of_every_command_shows_an_example_and_loads_no_robot_and_no_plots(
         "        copsense.main([name, '--help'], standalone_mode=False)\n"
         "    texts[name] = out.getvalue()\n"
         "import json\n"
-        "heavy = {'matplotlib', 'jinja2', 'netCDF4', 'mujoco', 'icub_models'} & set(sys.modules)\n"
-        "print(json.dumps([texts, sorted(heavy)]))"
+        f"print(json.dumps([texts, sorted({HEAVY!r} & set(sys.modules))]))"
     )
     done = run(code=code)
     assert done.returncode == 0, done.stderr
