@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -10,11 +11,20 @@ from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
+import pandas as pd
 import pinocchio as pin
 import xarray as xr
 from jaxtyping import Float
 
 from copsense._version import __version__
+from copsense.benchmark import (
+    ControllerChoice,
+    Lean,
+    PostureChoice,
+    RobotChoice,
+    make_plan,
+    run_benchmark,
+)
 from copsense.binding import LimitChange, next_change
 from copsense.closed_loop import sway_in_simulation
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
@@ -56,6 +66,7 @@ _PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 # What public balancing configurations for this robot use: mu = 1/3, torsion 1/75 m, f_z over 10 N.
 LIMITS = Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
 SWAY_FREQUENCY = 0.05  # Hz: slow enough to be nearly quasi-static; the paper prints none
+_JOBS = 4  # processes at most that lean robots
 _ROLLING = 3e-3  # m: least margin of the CoP in closed loop within limits
 _LEAST = 5  # postures: fewer than this cannot show where anything crosses
 _LENGTHS = 25  # values of L in the figure on the unit of length
@@ -111,6 +122,8 @@ class Reproduction:
         unit_of_length: criterion 1's dependence on L.
         within_limits: the same path within limits, and the regions that they leave the CoM.
         sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
+        leans: slow leans to the first tip in several postures, both criteria, as
+            `copsense.benchmark` tells them; None where the closed loop was left out.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.
         sway_claims: Section V, judged in closed loop.
@@ -133,6 +146,7 @@ class Reproduction:
     unit_of_length: UnitOfLength
     within_limits: WithinLimits
     sway: Sway | None
+    leans: pd.DataFrame | None
     four_bar_claims: tuple[EvaluatedClaim, ...]
     icub_claims: tuple[EvaluatedClaim, ...]
     sway_claims: tuple[EvaluatedClaim, ...]
@@ -194,9 +208,10 @@ def reproduce(
     within = _within_limits(stance, path, limits, clock)
     with clock.stage("unit of length"):
         unit = _unit_of_length(stance)
-    sway = None
+    sway = leans = None
     if sway_frequency is not None:
         sway = _sway(stance, limits, sway_frequency, clock)
+        leans = _leans(clock)
     with clock.stage("claims"):
         icub_claims = evaluate_icub_claims(lateral, four_bar)
         there = {c.claim.identifier: c.verdict for c in evaluate_icub_claims(at_sole, four_bar)}
@@ -212,6 +227,7 @@ def reproduce(
         unit_of_length=unit,
         within_limits=within,
         sway=sway,
+        leans=leans,
         four_bar_claims=claims,
         icub_claims=icub_claims,
         sway_claims=() if sway is None else evaluate_sway_claims(sway),
@@ -305,6 +321,29 @@ def _sway(stance: Stance, limits: Limits, frequency: float, clock: _Clock) -> Sw
     )
     clock.seconds["closed loop"] = time.perf_counter() - started
     return found
+
+
+def _leans(clock: _Clock) -> pd.DataFrame:
+    """The iCub leant slowly until a foot tips, in three postures under both criteria."""
+    plan = make_plan(
+        [RobotChoice("icub")],
+        [
+            PostureChoice("straight legs"),
+            PostureChoice("knees 0.6 rad", knees=0.6),
+            PostureChoice("feet 0.20 m apart", width=0.2),
+        ],
+        [ControllerChoice(name) for name in ("minimum-wrench", "minimum-torque")],
+        [Lean()],
+    )
+    parts, done = 100, 0.0
+    with clock.stage("closed loop: leans", parts) as advance:
+
+        def tick(share: float) -> None:
+            nonlocal done
+            before, done = done, done + share
+            advance(int(done * parts) - int(before * parts))
+
+        return run_benchmark(plan, jobs=min(_JOBS, os.cpu_count() or 1), progress=tick)
 
 
 def _facts(stance: Stance, criterion: Criterion) -> dict[str, float]:

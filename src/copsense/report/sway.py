@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import pandas as pd
+
+from copsense.benchmark import CAVEAT, agreement
 from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel
 from copsense.plots import plot_sway_cop, plot_sway_hip_roll, plot_sway_limits, plot_sway_load
 from copsense.plots.style import Figure
@@ -119,6 +122,40 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
             }
         )
     return rows
+
+
+def lean_rows(leans: pd.DataFrame) -> list[dict[str, str]]:
+    """A row for each lean: where a foot tipped, and where it should have."""
+    return [
+        {
+            "posture": str(row["posture"]),
+            "controller": str(row["controller"]),
+            "tip": _mm(float(row["value"]) * 1e3)
+            if row["status"] == "measured"
+            else str(row["reason"]),
+            "path": _mm(float(row["predicted"]) * 1e3),
+            "first_order": _mm(float(row["first_order"]) * 1e3),
+            "contact": str(row["contact"]),
+        }
+        for _, row in leans[leans["score"] == "tip_excursion"].iterrows()
+    ]
+
+
+def lean_words(leans: pd.DataFrame) -> str:
+    """How well the predictions hold, with the caveat."""
+    found = agreement(leans)
+    words = []
+    for _, row in found[found["score"] == "tip_excursion"].iterrows():
+        between = (
+            f", r = {row['correlation']:.4f} (95 % interval {row['low']:.4f} to {row['high']:.4f})"
+            if math.isfinite(row["correlation"])
+            else ""
+        )
+        words.append(
+            f"{row['prediction']}: error {row['mean_error'] * 1e3:.2f} mm on average, "
+            f"{row['largest_error'] * 1e3:.2f} mm at most{between}, {row['cases']} cases"
+        )
+    return "; ".join(words) + f". {CAVEAT}"
 
 
 def sway_differences(sway: Sway) -> tuple[str, ...]:
