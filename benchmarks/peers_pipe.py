@@ -17,9 +17,10 @@ joints of one number each; quaternion x, y, z, w; base velocity in its own axes)
     time, q (7 + n), v (6 + n), centre of mass, its velocity and acceleration (3 each, world),
     target configuration (7 + n), target velocity (6 + n)
 
-The answer S is: seconds for the whole step, seconds in the solver alone, torques (n), contact
-wrenches (6 per contact, contact axes, force first; NaN where not known). The answer T is the two
-times of every state, a row each. Times are measured in the child, without the pipe.
+The answer S is: three times [s], torques (n), contact wrenches (6 per contact, contact axes, force
+first; NaN where not known). The answer T is the three times of every state, a row each. They are
+measured in the child, without the pipe: the whole call, targets handed over and results read; of
+that, kinematics and solver; of that, the solver.
 
 The child is sent {"urdf", "joints", "contacts", "mass", "start", ...} and answers {"joints",
 "mass", "com", "versions"}: what its own model says, which the parent compares.
@@ -96,7 +97,8 @@ class State:
         self.time, self.posture, self.velocity = float(time_[0]), q, v
 
 
-Step = Callable[[State], tuple[float, float, np.ndarray, np.ndarray]]
+Times = tuple[float, float, float]
+Step = Callable[[State], tuple[Times, np.ndarray, np.ndarray]]
 
 
 def serve(build: Callable[[dict[str, Any]], tuple[dict[str, Any], Step]]) -> None:
@@ -104,7 +106,7 @@ def serve(build: Callable[[dict[str, Any]], tuple[dict[str, Any], Step]]) -> Non
 
     Args:
         build: what came first -> what to answer, and the controller. That takes a `State` and
-            returns its time, the solver's time, torques and wrenches.
+            returns the three times, torques and wrenches.
     """
     requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the frames
@@ -119,11 +121,11 @@ def serve(build: Callable[[dict[str, Any]], tuple[dict[str, Any], Step]]) -> Non
                 return
             states = [State(row, n) for row in np.frombuffer(body, "<f8").reshape(-1, width(n))]
             if kind == b"T":
-                times = np.array([step(state)[:2] for state in states])
+                times = np.array([step(state)[0] for state in states])
                 write_frame(answers, b"T", times.astype("<f8").tobytes())
             else:
-                whole, solver, torques, wrenches = step(states[0])
-                answer = np.concatenate([[whole, solver], torques, np.ravel(wrenches)])
+                seconds, torques, wrenches = step(states[0])
+                answer = np.concatenate([seconds, torques, np.ravel(wrenches)])
                 write_frame(answers, b"S", answer.astype("<f8").tobytes())
     except Exception as error:
         with contextlib.suppress(PipeError):
@@ -155,13 +157,14 @@ class PipeController:
         patience: float = 60.0,
     ) -> None:
         """Start the child and compare its robot with ours."""
-        self.name, self._patience, self.seconds = name, patience, []
+        self.name, self._patience = name, patience
+        self.seconds: list[np.ndarray] = []
         threads = ("OPENBLAS", "OMP", "MKL")
         environment = os.environ | {f"{key}_NUM_THREADS": "1" for key in threads}
         # The child's packages are its own environment's.
         for key in ("PYTHONPATH", "PYTHONHOME"):
             environment.pop(key, None)
-        self._log = log.open("ab") if log else open(os.devnull, "wb")  # noqa: SIM115
+        self._log = (log or Path(os.devnull)).open("ab")
         self.process = subprocess.Popen(
             command,
             env=environment,
@@ -234,12 +237,12 @@ class PipeController:
         """Torques (n,) in our order, and wrenches (nc, 6), NaN where not known."""
         numbers = np.frombuffer(self._ask(b"S", self._row(seen).astype("<f8").tobytes()), "<f8")
         n = len(self._order)
-        if numbers.size != 2 + n + 6 * self._contacts:
+        if numbers.size != 3 + n + 6 * self._contacts:
             raise PipeError(f"{self.name} answered {numbers.size} numbers")
-        self.seconds.append(numbers[:2].copy())
+        self.seconds.append(numbers[:3].copy())
         torques = np.empty(n)
-        torques[self._order] = numbers[2 : 2 + n]
-        return torques, numbers[2 + n :].reshape(-1, 6).copy()
+        torques[self._order] = numbers[3 : 3 + n]
+        return torques, numbers[3 + n :].reshape(-1, 6).copy()
 
     def __call__(self, observation: Any) -> Any:
         """What `copsense.controllers.Controller` asks for."""
@@ -249,9 +252,9 @@ class PipeController:
         return Command(torques, wrenches if np.all(np.isfinite(wrenches)) else None)
 
     def times(self, observations: list[Any]) -> np.ndarray:
-        """Time of the step and of the solver alone at each of some states (N, 2) [s]."""
+        """The three times at each of some states (N, 3) [s]."""
         rows = np.array([self._row(seen) for seen in observations])
-        return np.frombuffer(self._ask(b"T", rows.astype("<f8").tobytes()), "<f8").reshape(-1, 2)
+        return np.frombuffer(self._ask(b"T", rows.astype("<f8").tobytes()), "<f8").reshape(-1, 3)
 
     def close(self) -> None:
         """End the child."""
@@ -260,7 +263,7 @@ class PipeController:
                 with contextlib.suppress(OSError):
                     pipe.close()
         try:
-            self.process.wait(2.0)
+            self.process.wait(1.0)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

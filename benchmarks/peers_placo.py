@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 import placo
-from peers_pipe import State, Step, clock, serve
+from peers_pipe import State, Step, Times, clock, serve
 
-COM, POSTURE = 1e4, 1e2  # weights
+COM, POSTURE = 1e4, 1.0  # weights: the posture yields to the CoM
 SHARE, OFF = 1e-4, 1e-14  # of the criterion that is asked for, and of the one that is not
 
 
@@ -60,11 +60,14 @@ def build(setup: dict[str, Any]) -> tuple[dict[str, Any], Step]:
     posture.configure("posture", "soft", POSTURE)
     posture.kp, posture.kd = gains["posture"]
 
-    def step(state: State) -> tuple[float, float, np.ndarray, np.ndarray]:
+    def step(state: State) -> tuple[Times, np.ndarray, np.ndarray]:
+        called = clock()
         com.target_world, com.dtarget_world = state.com, state.com_velocity
         com.ddtarget_world = state.com_acceleration
         posture.set_joints(dict(zip(joints, map(float, state.posture[7:]), strict=True)))
-        posture.set_joints_velocities(dict(zip(joints, map(float, state.velocity[6:]), strict=True)))
+        posture.set_joints_velocities(
+            dict(zip(joints, map(float, state.velocity[6:]), strict=True))
+        )
         began = clock()
         robot.state.q, robot.state.qd = state.q, state.v
         robot.update_kinematics()
@@ -74,10 +77,12 @@ def build(setup: dict[str, Any]) -> tuple[dict[str, Any], Step]:
         if not result.success:
             raise RuntimeError(f"the solver found no solution at {state.time:.3f} s")
         wrenches = np.array([np.ravel(foot.wrench) for foot in feet])
+        torques = np.array(result.tau)[6:]
+        times = (clock() - called, ended - began, ended - middle)
         if setup["limits"]:  # about the soles' centres, in the contact frames' axes
             for k, contact in enumerate(setup["contacts"]):
                 wrenches[k, 3:] += np.cross(contact["offset"], wrenches[k, :3])
-        return ended - began, ended - middle, np.array(result.tau)[6:], wrenches
+        return times, torques, wrenches
 
     return hello, step
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from peers_pipe import State, Step, clock, serve
+from peers_pipe import State, Step, Times, clock, serve
 from tsid import tsid_pywrap as tsid
 
-COM, POSTURE, FORCE = 1e4, 1e2, 1e-4  # weights
+COM, POSTURE, FORCE = 1e4, 1.0, 1e-4  # weights: the posture yields to the CoM
 FAR, GRIP = 1.0, 10.0  # half of a sole [m] and its friction, without limits
 MOST = 1e6  # N
 KEPT: list[Any] = []  # tsid's objects hold each other by bare references
@@ -49,7 +49,13 @@ def build(setup: dict[str, Any]) -> tuple[dict[str, Any], Step]:
         points = np.array([[x - a, x - a, x + a, x + a], [y - b, y + b, y - b, y + b], [z] * 4])
         friction, least = (limits["friction"], limits["force"]) if limits else (GRIP, 0.0)
         foot = tsid.Contact6d(
-            contact["name"], robot, contact["name"], points, np.array([0.0, 0, 1]), friction, least,
+            contact["name"],
+            robot,
+            contact["name"],
+            points,
+            np.array([0.0, 0, 1]),
+            friction,
+            least,
             MOST,
         )
         foot.setKp(np.zeros(6))
@@ -74,7 +80,8 @@ def build(setup: dict[str, Any]) -> tuple[dict[str, Any], Step]:
 
     KEPT.extend([model, robot, problem, com, posture, solver, contacts])
 
-    def step(state: State) -> tuple[float, float, np.ndarray, np.ndarray]:
+    def step(state: State) -> tuple[Times, np.ndarray, np.ndarray]:
+        called = clock()
         com_sample.value(state.com)
         com_sample.derivative(state.com_velocity)
         com_sample.second_derivative(state.com_acceleration)
@@ -98,7 +105,7 @@ def build(setup: dict[str, Any]) -> tuple[dict[str, Any], Step]:
                 for foot in contacts
             ]
         )
-        return ended - began, ended - middle, np.array(torques), wrenches
+        return (clock() - called, ended - began, ended - middle), np.array(torques), wrenches
 
     return hello, step
 
