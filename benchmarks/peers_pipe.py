@@ -176,7 +176,7 @@ class PipeController:
         try:
             self.hello = json.loads(self._ask(b"J", json.dumps(setup).encode()))
             self._order = self._compare(setup)
-        except PipeError:
+        except BaseException:
             self.close()
             raise
         self._contacts = len(setup["contacts"])
