@@ -26,7 +26,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads its BLA
 import mujoco
 import numpy as np
 import pinocchio as pin
-from balancing import C1, C2, LIMITS, POSTURES, icub
 from peers_pipe import PipeController, PipeError, clock
 from tqdm import tqdm
 
@@ -48,7 +47,9 @@ from copsense.simulation.prediction import predict
 
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "peers"
-BENT = ("straight", "knees 0.6 rad", "knees 1.0 rad")
+C1, C2 = copsense.minimum_wrench(1.0), copsense.minimum_torque()
+LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
+KNEES = {"straight": 0.0, "knees 0.6 rad": 0.6, "knees 1.0 rad": 1.0}
 REACH, FAR = 0.055, 0.07  # m: the leans without and with limits
 EDGE = 2e-5  # m: a CoP that near has reached it
 SETTLED = 0.05  # s: from when on the contacts carry the robot
@@ -120,6 +121,23 @@ PEERS = (
 def _clean() -> dict[str, str]:
     """This process's environment without what points at its packages."""
     return {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
+
+
+def icub(knee: float = 0.0) -> copsense.Stance:
+    """The iCub on soles of 160 x 72 mm, 0.14 m apart, knees bent [rad]."""
+    posture = {}
+    for side in "lr":
+        posture[f"{side}_hip_pitch"], posture[f"{side}_ankle_pitch"] = knee / 2, -knee / 2
+        posture[f"{side}_knee"] = -knee
+    contacts = [
+        copsense.Contact(
+            f"{side}_sole",
+            polygon=copsense.rectangle((-0.0535, 0.1065), reach),
+            offset=(0.0, 0.0, -0.0105),
+        )
+        for side, reach in (("l", (-0.031, 0.041)), ("r", (-0.041, 0.031)))
+    ]
+    return copsense.load_stance("icub", contacts=contacts, posture=posture, width=0.14)
 
 
 def describe(stance: copsense.Stance) -> dict[str, Any]:
@@ -221,7 +239,7 @@ def leans(
         head = f"| {posture} | {criterion.name} | {peer.name if peer else 'copsense'} | "
         if peer and peer.name in lost:
             continue
-        stance, signal = icub(*POSTURES[posture]), Ramp(reach)
+        stance, signal = icub(KNEES[posture]), Ramp(reach)
         reference = lateral_reference(stance, signal)
         expected = predict(reference, criterion, limits)
         controller: Any = None
@@ -353,7 +371,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     BUILD.mkdir(parents=True, exist_ok=True)
     lost: dict[str, str] = {}
-    versions = {}
+    postures, versions = tuple(KNEES), {}
     for peer in PEERS:
         try:
             controller = peer.controller(icub(), C1)
@@ -362,8 +380,8 @@ def main() -> None:
         else:
             versions[peer.name] = ", ".join(controller.hello["versions"])
             controller.close()
-    tips = leans(BENT[:1] if quick else BENT, REACH, None, lost)
-    within = [] if quick else leans(BENT[:1], FAR, LIMITS, lost)
+    tips = leans(postures[:1] if quick else postures, REACH, None, lost)
+    within = [] if quick else leans(postures[:1], FAR, LIMITS, lost)
     table = speed(lost)
     text = [
         "# Peers as referees",
