@@ -58,7 +58,7 @@ def add_limits(
         row["limit_travel"] = {
             f"{'+' if side > 0 else '-'}y": [
                 {
-                    "name": t.margin.name,
+                    "name": t.name,
                     "margin": t.margin.value,
                     "unit": t.margin.unit,
                     "first_order": t.first_order,
@@ -94,7 +94,11 @@ def limit_verdict(answer: dict[str, Any]) -> str:
 
 
 def print_limits(row: dict[str, Any]) -> None:
-    """Active limits, and how far the CoM may go to either side."""
+    """Active limits, and how far the CoM may go to either side.
+
+    To the next change of them the wrenches are those within the limits; to each limit they are the
+    criterion's own.
+    """
     names = "; ".join(
         limit["name"] + ("" if limit["multiplier"] else " (touched)")
         for limit in row["active_limits"]
@@ -108,15 +112,18 @@ def print_limits(row: dict[str, Any]) -> None:
                 f"  CoM to {side}: {exact['travel'] * 1e3:6.1f} mm until {exact['name']} "
                 f"{'binds' if exact['binds'] else 'lets go'} (first order: {predicted})"
             )
+    if row["active_limits"]:
+        click.echo("  unclipped, the criterion's own wrenches:")
     for side, travels in row["limit_travel"].items():
         for travel in travels[:3]:
             if travel["exact"] is None:
                 continue
             first = travel["first_order"]
             predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
+            predicted = "met" if travel["exact"] == 0 else f"first order: {predicted}"
             click.echo(
                 f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
-                f"(first order: {predicted})"
+                f"({predicted})"
             )
 
 
