@@ -142,16 +142,6 @@ def test_an_unknown_family_is_one_error():
     assert "mix" in copsense("design", "icub", "--family", "lengths").error
 
 
-def test_an_explicit_friction_overrides_the_contacts_own(tmp_path):
-    areas = []
-    for friction in ("contact", "0.7", "0.1"):
-        arguments = ("--limits", f"friction={friction}", "--regions", tmp_path / "r.png", "--force")
-        answer = copsense("analyse", "solo12", *arguments, "--json").json
-        areas.append(answer["regions"]["of"]["minimum-torque"]["area"])
-    assert areas[0] == areas[1]  # the contacts of this robot carry 0.7
-    assert areas[2] < 0.9 * areas[1]
-
-
 def test_a_design_without_travel_says_so():
     answer = copsense("design", "icub", "--family", "length", "--grid", 3, "--limits", "friction=0")
     assert answer.code == 0, answer.err

@@ -307,3 +307,13 @@ def test_contact_turned_in_its_link_keeps_its_meaning(icub):
     np.testing.assert_allclose(
         one.world_wrenches, other.world_wrenches, atol=1e-9 * at.robot.weight
     )
+
+
+def test_an_explicit_friction_overrides_the_contacts_own(stance_of):
+    stance = stance_of("solo12")
+    assert {contact.friction for contact in stance.contacts} == {0.7}
+    own, same, ice = (
+        limit_rows(stance, replace(NO_LIMITS, friction=mu)).matrix for mu in ("contact", 0.7, 0.1)
+    )
+    np.testing.assert_array_equal(own, same)
+    assert not np.allclose(own, ice)

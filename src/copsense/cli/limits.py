@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.errors import CopsenseError
+
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.limits import Limits
@@ -29,7 +31,6 @@ def add_limits(
 
     The changes are along the path's tangent, to either side, first order and exact.
     """
-    from copsense.binding import next_change
     from copsense.equilibrium import ConstrainedEquilibrium
     from copsense.limits import torque_placeholders
     from copsense.margins import limit_margins, limit_travel
@@ -45,16 +46,12 @@ def add_limits(
         row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
         row["optimality"] = equilibrium.optimality()
         row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
-        predicted = results[criterion.name].active_set_changes(tangent)
-        row["next_change"] = {}
-        for side, first in ((1, predicted[1]), (-1, predicted[0])):
-            exact = next_change(stance, criterion, limits, side)
-            row["next_change"][f"{'+' if side > 0 else '-'}y"] = {
-                "first_order": None if first is None else asdict(first),
-                "exact": None
-                if exact is None
-                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
-            }
+        row["next_change"] = _changes(stance, criterion, limits, results[criterion.name], tangent)
+        if not row["next_change"]:
+            answer.setdefault("notes", []).append(
+                f"the limits that {criterion.name} presses here are degenerate: the next change of "
+                "them is not told. Move a little."
+            )
         row["limit_travel"] = {
             f"{'+' if side > 0 else '-'}y": [
                 {
@@ -68,6 +65,28 @@ def add_limits(
             ]
             for side in (1, -1)
         }
+
+
+def _changes(
+    stance: Stance, criterion: Criterion, limits: Limits, result: CopSensitivity, tangent: Any
+) -> dict[str, Any]:
+    """The next change of the active limits to either side; nothing where none can be told."""
+    from copsense.binding import next_change
+
+    found: dict[str, Any] = {}
+    try:
+        back, forth = result.active_set_changes(tangent)
+        for side, first in ((1, forth), (-1, back)):
+            exact = next_change(stance, criterion, limits, side)
+            found[f"{'+' if side > 0 else '-'}y"] = {
+                "first_order": None if first is None else asdict(first),
+                "exact": None
+                if exact is None
+                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+            }
+    except CopsenseError:
+        return {}
+    return found
 
 
 def limit_verdict(answer: dict[str, Any]) -> str:
