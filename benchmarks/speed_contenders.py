@@ -99,9 +99,7 @@ def finite_differences(
     return evaluate
 
 
-def analytic(
-    model: pin.Model, frames: list[str]
-) -> Callable[[np.ndarray], tuple[np.ndarray, ...]]:
+def analytic(model: pin.Model, frames: list[str]) -> Callable[[np.ndarray], tuple[np.ndarray, ...]]:
     """Pinocchio's derivatives, and one adjoint solve for the four CoP coordinates of a criterion.
 
     With A = d(G - J' f)/dq at fixed f and D = d(J nu)/dq at fixed nu, nu = (y, tau):

@@ -6,7 +6,6 @@ Every function returns the rows of a Markdown table. Rows of a table take turns,
 from __future__ import annotations
 
 import os
-import resource
 import statistics
 import subprocess
 import sys
@@ -14,6 +13,7 @@ import time
 import tracemalloc
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from equality import draw, with_hands
@@ -116,14 +116,17 @@ def counts(rounds: int, progress: Callable[[str], None]) -> list[str]:
     rows = []
     for n in numbers:
         progress(f"memory of {n} postures")
-        rows.append(f"| {n} | {microseconds(times[str(n)])} | {peak_memory(n):.0f} |")
+        peak, before = peak_memory(n)
+        rows.append(f"| {n} | {microseconds(times[str(n)])} | {peak:.0f} | {before:.0f} |")
     return rows
 
 
-def peak_memory(count: int) -> float:
-    """Peak resident memory [MB] of a process that evaluates so many postures in chunks."""
+def peak_memory(count: int) -> tuple[float, float]:
+    """Peak resident memory [MB] of a process that evaluates so many postures, and before."""
     command = [sys.executable, __file__, str(count)]
-    return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    peak, before = (float(word) for word in said.split())
+    return peak, before
 
 
 def threads(rounds: int, progress: Callable[[str], None], cores: set[int]) -> list[str]:
@@ -217,12 +220,22 @@ def allocations(kernel: BatchKernel, q: list[np.ndarray], calls: int = 1000) -> 
     return {"kept": kept, "compiled": compiled, "passing": passing, "calls": calls}
 
 
+def resident(what: str) -> float:
+    """Memory of this process by Linux [MB]: VmRSS, or VmHWM, the most since it was set back."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith(what)) / 1024
+
+
 def main() -> None:
-    """Evaluate so many postures in chunks and print the process's peak memory [MB]."""
+    """Evaluate so many postures in chunks; print the process's peak memory and what it had."""
     stance = copsense.load_stance("icub")
     pool = draw(stance, CHUNK, seed=2)
-    in_chunks(BatchKernel(stance, CRITERIA, gains=False), pool, int(sys.argv[1]))
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    kernel = BatchKernel(stance, CRITERIA, gains=False)
+    in_chunks(kernel, pool, 8)  # load the machine code
+    Path("/proc/self/clear_refs").write_text("5")  # the peak starts from here
+    before = resident("VmRSS")
+    in_chunks(kernel, pool, int(sys.argv[1]))
+    print(resident("VmHWM"), before)
 
 
 if __name__ == "__main__":
