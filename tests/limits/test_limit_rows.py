@@ -78,15 +78,6 @@ def test_limits_that_do_not_bind_change_nothing(shod):
         np.testing.assert_allclose(within.multipliers, free.multipliers, atol=1e-8)
 
 
-def test_a_number_serves_contacts_without_a_coefficient_only(shod):
-    bare = shod.with_contacts([shod.contacts[0], replace(shod.contacts[1], friction=None)])
-    own, _ = rows_of_foot(bare, replace(NO_LIMITS, friction=0.2), 0)
-    given, _ = rows_of_foot(bare, replace(NO_LIMITS, friction=0.2), 1)
-    assert own[0, 2] == pytest.approx(-MU * np.cos(np.pi / 8))
-    assert given[0, 2] == pytest.approx(-0.2 * np.cos(np.pi / 8))
-    assert len(rows_of_foot(bare, replace(NO_LIMITS, friction="contact"), 1)[0]) == 0
-
-
 @pytest.mark.parametrize("sides", [3, 4, 5, 8, 33])
 def test_pyramid_is_inscribed_in_the_cone(shod, sides):
     A, b = rows_of_foot(shod, replace(NO_LIMITS, friction="contact", friction_sides=sides))
