@@ -21,7 +21,7 @@ for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
     travel = copsense.limit_travel(stance, criterion, limits)
     found = copsense.next_change(stance, criterion, limits)
     print(
-        f"{criterion.name}: {travel.first.margin.name} after {travel.first.exact * 1e3:.1f} mm "
+        f"{criterion.name}: {travel.first.name} after {travel.first.exact * 1e3:.1f} mm "
         f"(first order {travel.first.first_order * 1e3:.1f}); "
         f"slopes {found.before[:, 1].round(2)} -> {found.after[:, 1].round(2)}"
     )

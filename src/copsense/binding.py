@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,7 +13,7 @@ from jaxtyping import Float
 from copsense.arrays import finite_number
 from copsense.criterion import Criterion
 from copsense.equilibrium import ConstrainedEquilibrium, distance_to_change
-from copsense.errors import CopsenseError, InvalidInputError, UnloadedContactError
+from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits
 from copsense.motion import lateral_posture
 from copsense.sensitivity import cop_sensitivity
@@ -39,7 +38,7 @@ class LimitChange:
             another limit's.
         before: dCoP/dCoM_y of each contact just before the change (nc, 2), contact axes; None
             where a contact carries no load there, and has no centre of pressure.
-        after: the same just after.
+        after: the same just after; None too where the limits leave no way on.
     """
 
     criterion: str
@@ -110,12 +109,7 @@ def next_change(
     row, travel = found
     y = y0 + direction * travel
     here, there_tangent = lateral_posture(stance, y, near=walked[-1][1])
-    before = after = None
-    # A contact that just unloads has no centre of pressure to speak of.
-    with suppress(UnloadedContactError):
-        there = cop_sensitivity(here, criterion, limits)
-        # Along the direction of travel; turned back to world +y.
-        before, after = (direction * side for side in there.one_sided(direction * there_tangent))
+    before, after = _sides(here, criterion, limits, direction, there_tangent)
     return LimitChange(
         criterion.name,
         begin.equilibrium.names[row],
@@ -126,6 +120,23 @@ def next_change(
         before,
         after,
     )
+
+
+def _sides(
+    stance: Stance, criterion: Criterion, limits: Limits, direction: int, tangent: np.ndarray
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """dCoP/dCoM_y before and after on the way; None where there is none."""
+    try:
+        there = cop_sensitivity(stance, criterion, limits)
+    except CopsenseError:
+        return None, None  # a contact that just unloads has no centre of pressure to speak of
+    found: list[np.ndarray | None] = []
+    for side in (-direction, direction):
+        try:
+            found.append(there.one_side(tangent, side))
+        except CopsenseError:
+            found.append(None)  # the limits may leave no way on: a brink, or a sole's corner
+    return found[0], found[1]
 
 
 def _first_below_zero(

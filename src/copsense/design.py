@@ -162,7 +162,8 @@ def design_criterion(
         raise InvalidInputError(
             f"no criterion of the family {family.name!r} works along this path. Try another."
         )
-    start = min(looked, key=lambda pair: cost(pair[1]))
+    # Of equals, such as where the path ends before any limit, the one that strains least.
+    start = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
     refined = scipy.optimize.minimize(
         lambda logs: cost(judge(logs)),
         start[0],
@@ -171,7 +172,7 @@ def design_criterion(
         options={"xatol": 1e-2, "fatol": 1e-6, "maxfev": 40 * len(axes)},
     )
     best = judge(refined.x) or start[1]
-    if cost(best) > cost(start[1]):
+    if cost(best) > cost(start[1]) - _ROUNDING:
         best = start[1]
     candidates = (*(s for _, s in looked), best)
     chosen = family.build([best.parameters[name] for name in family.parameters])

@@ -30,8 +30,8 @@ class Limits:
 
     Attributes:
         normal_force: least normal force of every contact [N].
-        friction: Coulomb coefficient for contacts that give none of their own; ``"contact"`` takes
-            the contacts' own and leaves those without one unlimited; None switches friction off.
+        friction: Coulomb coefficient of every contact; ``"contact"`` takes the contacts' own and
+            leaves those without one unlimited; None switches friction off.
         friction_sides: sides of the pyramid inscribed in the friction cone, at least 3.
         cop_margin: how far inside the sole's edges the centre of pressure must stay [m].
         torsion: torsional coefficient [m], ``|m_z| <= coefficient f_z``;
@@ -62,7 +62,9 @@ class Limits:
                 raise InvalidInputError(
                     f"limit {name} must be a non-negative number or None, got {value}."
                 )
-        if not (self.friction_sides >= 3 and self.friction_sides == int(self.friction_sides)):
+        sides: object = self.friction_sides
+        number = float(sides) if isinstance(sides, int | float | np.integer) else float("nan")
+        if not (number >= 3 and number.is_integer()):
             raise InvalidInputError(
                 f"a friction pyramid has a whole number of sides, 3 or more; got "
                 f"{self.friction_sides}."
@@ -216,9 +218,7 @@ def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
     if limits.normal_force is not None:
         rows.append(("normal force", "normal force", _unit(2) * -1.0, -limits.normal_force))
     mu = contact.friction
-    if limits.friction is None:
-        mu = None
-    elif mu is None and not isinstance(limits.friction, str):
+    if not isinstance(limits.friction, str):
         mu = limits.friction
     if mu is not None:
         rows += _pyramid_rows(contact, mu, limits.friction_sides)
@@ -228,9 +228,9 @@ def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
     if limits.torsion == "cone" and contact.kind == "surface":
         rows += _cone_rows(contact, mu, limits.friction_sides)
     torsion = contact.torsional_friction
-    if limits.torsion is None or limits.torsion == "cone":
+    if limits.torsion == "cone":
         torsion = None
-    elif torsion is None and not isinstance(limits.torsion, str):
+    elif not isinstance(limits.torsion, str):
         torsion = limits.torsion
     if torsion is not None and contact.kind == "surface":
         for sign, side in ((1.0, "left"), (-1.0, "right")):

@@ -49,12 +49,16 @@ class LimitTravel:
     """How far the CoM may go along a path until one limit is reached.
 
     Attributes:
-        margin: the margin where the path begins.
-        first_order: travel predicted by the sensitivity there [m]; infinite if it moves away.
-        exact: travel found along the path [m]; None if the limit is not met within reach.
+        margin: the margin of the contact or joint to this kind of limit where the path begins.
+        name: the very limit that is met (another edge than the nearest one at the start, say);
+            where none is met within reach, the one predicted.
+        first_order: its travel predicted by the sensitivity there [m]; infinite if it moves away,
+            0 where it is beyond its bound already.
+        exact: its travel found along the path [m]; None if no such limit is met within reach.
     """
 
     margin: LimitMargin
+    name: str
     first_order: float
     exact: float | None
 
@@ -133,14 +137,14 @@ def limit_travel(
             walked.append((float(step), *at(y0 + direction * float(step), walked[-1][1])))
         except CopsenseError:
             break  # no posture, or no normal force, further on
+    closing = np.where(rates < -_STILL, -values / np.minimum(rates, -_STILL), np.inf)
+    closing = np.where(values < 0, 0.0, closing)
     found = []
     for rows in table.groups:
-        margin = table.margin(rows, values)
-        closing = np.where(
-            rates[rows] < -_STILL, -values[rows] / np.minimum(rates[rows], -_STILL), np.inf
-        )
-        exact = _first_crossing(rows, walked, lambda s, near: at(y0 + direction * s, near)[1])
-        found.append(LimitTravel(margin, float(closing.min()), exact))
+        crossing = _first_crossing(rows, walked, lambda s, near: at(y0 + direction * s, near)[1])
+        row, exact = crossing or (int(rows[int(np.argmin(closing[rows]))]), None)
+        first = float(closing[row])
+        found.append(LimitTravel(table.margin(rows, values), table.names[row], first, exact))
     found.sort(key=lambda f: (np.inf if f.exact is None else f.exact, f.first_order))
     return Travel(direction, tuple(found), walked[-1][0])
 
@@ -149,10 +153,11 @@ def _first_crossing(
     rows: np.ndarray,
     walked: list[tuple[float, Stance, np.ndarray]],
     evaluate: Callable[[float, Stance], np.ndarray],
-) -> float | None:
-    """Smallest travel at which one of the rows is at its bound; None if all stay within."""
-    if np.any(walked[0][2][rows] < 0):
-        return 0.0
+) -> tuple[int, float] | None:
+    """The first row to be at its bound, and the travel at which it is; None if all stay within."""
+    begin = walked[0][2][rows]
+    if np.any(begin < 0):
+        return int(rows[int(np.argmin(begin))]), 0.0
     for (a, near, before), (b, _, after) in pairwise(walked):
         crossed = [i for i in rows if before[i] >= 0 > after[i]]
         if crossed:
@@ -162,8 +167,10 @@ def _first_crossing(
                 def one(s: float, row: int = i, start: Stance = near) -> float:
                     return float(evaluate(s, start)[row])
 
-                roots.append(float(scipy.optimize.brentq(one, a, b, xtol=_PRECISION)))
-            return min(roots)
+                root = float(scipy.optimize.brentq(one, a, b, xtol=_PRECISION))
+                roots.append((root, int(i)))
+            travel, row = min(roots)
+            return row, travel
     return None
 
 

@@ -90,17 +90,24 @@ class CopSensitivity:
 
         They differ where a limit is touched without pressing; elsewhere both are `along`.
         """
+        return self.one_side(tangent, -1, rate), self.one_side(tangent, 1, rate)
+
+    def one_side(
+        self, tangent: ArrayLike, side: int, rate: float = 1.0
+    ) -> Float[np.ndarray, "nc 2"]:
+        """d cop / d coordinate before (side -1) or after (+1) this point of a path.
+
+        Raises:
+            InvalidInputError: besides what `along` refuses, no way was found on that side: the
+                limits may be infeasible there.
+        """
         both = self.along(tangent, rate)
         equilibrium, t = self.equilibrium, np.asarray(tangent, dtype=float)
         if not isinstance(equilibrium, ConstrainedEquilibrium):
-            return both, both
-        forward = t if rate > 0 else -t
-        sides = []
-        for sign in (-1.0, 1.0):
-            forces = equilibrium.rates(sign * forward).forces
-            wrenches = equilibrium.stance.unstack(forces)
-            sides.append(sign * _cop_rate(equilibrium, self.cop, wrenches) / abs(rate))
-        return sides[0], sides[1]
+            return both
+        forces = equilibrium.rates(side * (t if rate > 0 else -t)).forces
+        wrenches = equilibrium.stance.unstack(forces)
+        return side * _cop_rate(equilibrium, self.cop, wrenches) / abs(rate)
 
     def active_set_changes(
         self, tangent: ArrayLike

@@ -113,6 +113,8 @@ def test_infeasible_limits_are_rows_with_the_limits_in_conflict():
         ("cop-margin=-1", "non-negative"),
         ("cop-margin=1", "sole"),
         ("sides=2", "3 or more"),
+        ("sides=off", "no number"),
+        ("friction=0.3,friction=0.4", "given twice"),
         ("torsion=cone,friction=off", "wrench cone"),
     ],
 )
@@ -138,3 +140,14 @@ def test_design_beats_the_papers_two_criteria_and_says_by_how_much(tmp_path):
 
 def test_an_unknown_family_is_one_error():
     assert "mix" in copsense("design", "icub", "--family", "lengths").error
+
+
+def test_a_design_without_travel_says_so():
+    answer = copsense("design", "icub", "--family", "length", "--grid", 3, "--limits", "friction=0")
+    assert answer.code == 0, answer.err
+    assert "beyond a limit in the middle already" in answer.out
+
+
+def test_two_pictures_need_two_files(tmp_path):
+    same = ("--plot", tmp_path / "a.png", "--regions", tmp_path / "a.png")
+    assert "Give each its own" in copsense("analyse", "icub", "--limits", LIMITS, *same).error

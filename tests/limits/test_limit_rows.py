@@ -78,15 +78,6 @@ def test_limits_that_do_not_bind_change_nothing(shod):
         np.testing.assert_allclose(within.multipliers, free.multipliers, atol=1e-8)
 
 
-def test_a_number_serves_contacts_without_a_coefficient_only(shod):
-    bare = shod.with_contacts([shod.contacts[0], replace(shod.contacts[1], friction=None)])
-    own, _ = rows_of_foot(bare, replace(NO_LIMITS, friction=0.2), 0)
-    given, _ = rows_of_foot(bare, replace(NO_LIMITS, friction=0.2), 1)
-    assert own[0, 2] == pytest.approx(-MU * np.cos(np.pi / 8))
-    assert given[0, 2] == pytest.approx(-0.2 * np.cos(np.pi / 8))
-    assert len(rows_of_foot(bare, replace(NO_LIMITS, friction="contact"), 1)[0]) == 0
-
-
 @pytest.mark.parametrize("sides", [3, 4, 5, 8, 33])
 def test_pyramid_is_inscribed_in_the_cone(shod, sides):
     A, b = rows_of_foot(shod, replace(NO_LIMITS, friction="contact", friction_sides=sides))
@@ -307,3 +298,13 @@ def test_contact_turned_in_its_link_keeps_its_meaning(icub):
     np.testing.assert_allclose(
         one.world_wrenches, other.world_wrenches, atol=1e-9 * at.robot.weight
     )
+
+
+def test_an_explicit_friction_overrides_the_contacts_own(stance_of):
+    stance = stance_of("solo12")
+    assert {contact.friction for contact in stance.contacts} == {0.7}
+    own, same, ice = (
+        limit_rows(stance, replace(NO_LIMITS, friction=mu)).matrix for mu in ("contact", 0.7, 0.1)
+    )
+    np.testing.assert_array_equal(own, same)
+    assert not np.allclose(own, ice)

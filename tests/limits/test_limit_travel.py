@@ -10,7 +10,8 @@ import copsense
 from copsense.cop import contact_cops
 from copsense.errors import InvalidInputError
 from copsense.limits import NO_LIMITS, Limits
-from copsense.margins import limit_margins, limit_travel
+from copsense.margins import limit_margins, limit_travel, margin_table
+from copsense.motion import lateral_posture
 
 D, HALF = 0.14, 0.03
 COP_ONLY = replace(NO_LIMITS, cop_margin=0.0)
@@ -181,7 +182,7 @@ def test_travel_does_not_depend_on_the_samples(rubbing):
         limit_travel(rubbing, WRENCH, LIMITS, 1, reach=0.06, samples=n) for n in (4, 25)
     )
     for a, b in zip(coarse.limits, fine.limits, strict=True):
-        assert a.margin.name == b.margin.name
+        assert (a.margin.name, a.name) == (b.margin.name, b.name)
         assert (a.exact is None) == (b.exact is None)
         assert a.exact is None or a.exact == pytest.approx(b.exact, abs=1e-8)
 
@@ -204,3 +205,24 @@ def test_limit_out_of_reach_is_none(rubbing):
 def test_other_directions_are_refused(rubbing, direction):
     with pytest.raises(InvalidInputError, match=r"\+1 or -1"):
         limit_travel(rubbing, TORQUE, COP_ONLY, direction)
+
+
+@pytest.mark.parametrize("robot", ["icub", "g1"])
+def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
+    stance = stance_of(robot)
+    limits = copsense.Limits(friction=0.4, torque="model")
+    named = 0
+    for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
+        for side in (1, -1):
+            for found in copsense.limit_travel(stance, criterion, limits, side).limits:
+                if not found.exact:
+                    continue
+                y = float(stance.com[1]) + side * found.exact
+                here, _ = lateral_posture(stance, y)
+                solved = copsense.solve_equilibrium(here, criterion)
+                table = margin_table(here, limits)
+                values = table.values(solved.forces, solved.torques)
+                at = [v for v, name in zip(values, table.names, strict=True) if name == found.name]
+                assert np.abs(at).min() < 1e-6
+                named += found.name != found.margin.name
+    assert named  # the nearest at the start is not always the one that is met

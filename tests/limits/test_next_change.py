@@ -166,3 +166,11 @@ def test_bad_questions_are_refused(icub):
     still[0] = 1.0
     with pytest.raises(InvalidInputError, match="moves a contact"):
         found.active_set_changes(still)
+
+
+@pytest.mark.parametrize(("robot", "y"), [("icub", 0.08), ("romeo", 0.06), ("icub", 0.11)])
+def test_where_the_limits_leave_no_way_on_the_change_is_told_all_the_same(stance_of, robot, y):
+    here, _ = lateral_posture(stance_of(robot), y)
+    limits = copsense.Limits(friction=1 / 3)
+    found = [copsense.next_change(here, c, limits, side) for c in CRITERIA for side in (-1, 1)]
+    assert any(change is not None for change in found)

@@ -63,6 +63,7 @@ class BatchKernel:
             )
         self.names = tuple(names)
         self._single: Any = None
+        self._shapes = {name: a.shape for name, a in _arrays(self.empty(0)).items()}
         self._choices = choices(stance, self.criteria)
         self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
         if not self.why_clear and importlib.util.find_spec("numba") is None:
@@ -189,10 +190,9 @@ class BatchKernel:
         return np.asarray(q)
 
     def _fitting(self, out: BatchResult, count: int) -> BatchResult:
-        wanted = {name: array.shape for name, array in _arrays(self.empty(0)).items()}
         for name, array in _arrays(out).items():
             first = 0 if name.startswith("com_") and not self.gains else count
-            shape = (first, *wanted[name][1:])
+            shape = (first, *self._shapes[name][1:])
             if array.shape != shape or not array.flags.c_contiguous or not array.flags.writeable:
                 raise InvalidInputError(
                     f"out.{name} has shape {array.shape}, or is not contiguous and writable; the "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -84,6 +85,8 @@ def analyse(
 
     for drawn in filter(None, (picture, regions)):
         check_output(drawn, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    if picture is not None and regions is not None and Path(picture) == Path(regions):
+        raise InvalidInputError("--plot and --regions name one file. Give each its own.")
     within = read_limits(limits)
     if regions is not None and (within is None or not within.any):
         raise InvalidInputError(

@@ -122,9 +122,14 @@ def _print(robot: str, found: Design) -> None:
     for row in (*found.baselines, found.score):
         click.echo(_line(row))
     chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
-    more = (found.score.travel / max(s.travel for s in found.baselines) - 1) * 100
+    own, known = found.score.travel, max(s.travel for s in found.baselines)
+    more = (
+        f"{(own / known - 1) * 100:+.0f} % over the better of the paper's two"
+        if known > 0
+        else f"{own * 1e3:.1f} mm, where the paper's two are beyond a limit in the middle already"
+    )
     reach = found.score.range * 1e3
-    click.echo(f"\nbest: {chosen}; travel {more:+.0f} % over the better of the paper's two")
+    click.echo(f"\nbest: {chosen}; travel {more}")
     click.echo(f"gain and torque norm over postures within {reach:.1f} mm of the middle")
     click.echo("\nPareto set (no other is better in both):")
     for row in found.pareto:

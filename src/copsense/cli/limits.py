@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.errors import CopsenseError
+
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.limits import Limits
@@ -29,7 +31,6 @@ def add_limits(
 
     The changes are along the path's tangent, to either side, first order and exact.
     """
-    from copsense.binding import next_change
     from copsense.equilibrium import ConstrainedEquilibrium
     from copsense.limits import torque_placeholders
     from copsense.margins import limit_margins, limit_travel
@@ -45,20 +46,16 @@ def add_limits(
         row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
         row["optimality"] = equilibrium.optimality()
         row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
-        predicted = results[criterion.name].active_set_changes(tangent)
-        row["next_change"] = {}
-        for side, first in ((1, predicted[1]), (-1, predicted[0])):
-            exact = next_change(stance, criterion, limits, side)
-            row["next_change"][f"{'+' if side > 0 else '-'}y"] = {
-                "first_order": None if first is None else asdict(first),
-                "exact": None
-                if exact is None
-                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
-            }
+        row["next_change"] = _changes(stance, criterion, limits, results[criterion.name], tangent)
+        if not row["next_change"]:
+            answer.setdefault("notes", []).append(
+                f"the limits that {criterion.name} presses here are degenerate: the next change of "
+                "them is not told. Move a little."
+            )
         row["limit_travel"] = {
             f"{'+' if side > 0 else '-'}y": [
                 {
-                    "name": t.margin.name,
+                    "name": t.name,
                     "margin": t.margin.value,
                     "unit": t.margin.unit,
                     "first_order": t.first_order,
@@ -68,6 +65,28 @@ def add_limits(
             ]
             for side in (1, -1)
         }
+
+
+def _changes(
+    stance: Stance, criterion: Criterion, limits: Limits, result: CopSensitivity, tangent: Any
+) -> dict[str, Any]:
+    """The next change of the active limits to either side; nothing where none can be told."""
+    from copsense.binding import next_change
+
+    found: dict[str, Any] = {}
+    try:
+        back, forth = result.active_set_changes(tangent)
+        for side, first in ((1, forth), (-1, back)):
+            exact = next_change(stance, criterion, limits, side)
+            found[f"{'+' if side > 0 else '-'}y"] = {
+                "first_order": None if first is None else asdict(first),
+                "exact": None
+                if exact is None
+                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+            }
+    except CopsenseError:
+        return {}
+    return found
 
 
 def limit_verdict(answer: dict[str, Any]) -> str:
@@ -94,7 +113,11 @@ def limit_verdict(answer: dict[str, Any]) -> str:
 
 
 def print_limits(row: dict[str, Any]) -> None:
-    """Active limits, and how far the CoM may go to either side."""
+    """Active limits, and how far the CoM may go to either side.
+
+    To the next change of them the wrenches are those within the limits; to each limit they are the
+    criterion's own.
+    """
     names = "; ".join(
         limit["name"] + ("" if limit["multiplier"] else " (touched)")
         for limit in row["active_limits"]
@@ -108,15 +131,18 @@ def print_limits(row: dict[str, Any]) -> None:
                 f"  CoM to {side}: {exact['travel'] * 1e3:6.1f} mm until {exact['name']} "
                 f"{'binds' if exact['binds'] else 'lets go'} (first order: {predicted})"
             )
+    if row["active_limits"]:
+        click.echo("  unclipped, the criterion's own wrenches:")
     for side, travels in row["limit_travel"].items():
         for travel in travels[:3]:
             if travel["exact"] is None:
                 continue
             first = travel["first_order"]
             predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
+            predicted = "met" if travel["exact"] == 0 else f"first order: {predicted}"
             click.echo(
                 f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
-                f"(first order: {predicted})"
+                f"({predicted})"
             )
 
 

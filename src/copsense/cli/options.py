@@ -252,12 +252,14 @@ def read_limits(text: str | None) -> Limits | None:
         name, _, value = part.partition("=")
         if name not in names:
             raise UnknownNameError("limit", name, names)
+        if names[name] in values:
+            raise InvalidInputError(f"the limit {name} is given twice. Give it once.")
         values[names[name]] = _limit_value(name, value)
     return Limits(**values)
 
 
 def _limit_value(name: str, value: str) -> float | int | str | None:
-    if value == "off":
+    if value == "off" and name != "sides":
         return None
     if value in {
         "friction": ("contact",),

@@ -303,11 +303,16 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
 def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
     """Where the first limit binds, and what happens there."""
     if not bindings:
-        return "No limit binds between the feet."
+        return "No other set of limits presses within reach."
     first: dict[str, LimitChange] = {}
     for found in sorted(bindings, key=lambda b: b.travel):
         first.setdefault(found.criterion, found)
     said = " and ".join(f"{b.travel * 1e3:.1f} mm under {name}" for name, b in first.items())
+    if not all(b.binds for b in bindings):
+        return (
+            "Some limits press with the CoM in the middle already. The first change of them comes "
+            f"at a CoM travel of {said} (right: verticals)."
+        )
     words = f"The first limit binds at a CoM travel of {said} (right: verticals)"
     if all("CoP" in b.limit for b in bindings):
         return (
@@ -315,7 +320,7 @@ def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
             "zero and the other foot's jumps up, because it has to carry what the first no longer "
             "can."
         )
-    return f"{words}: there the slopes jump, because the other foot carries what one no longer can."
+    return f"{words}: there the slopes may jump, for the other foot carries what one no longer can."
 
 
 def paper_criteria(reproduction: Reproduction) -> xr.Dataset:

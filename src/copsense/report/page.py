@@ -99,13 +99,12 @@ def number(value: float, unit: str = "1") -> str:
 
 def _binding(found: LimitChange) -> dict[str, str]:
     sides = {
-        name: "a foot carries no load"
-        if side is None
-        else ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
+        name: "none" if side is None else ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
         for name, side in (("before", found.before), ("after", found.after))
     }
     where = f"{found.com_y * 1e3:+.2f} mm"
-    return {"criterion": found.criterion, "limit": found.limit, "com_y": where} | sides
+    limit = found.limit if found.binds else f"{found.limit} lets go"
+    return {"criterion": found.criterion, "limit": limit, "com_y": where} | sides
 
 
 def _counts(claims: tuple[EvaluatedClaim, ...]) -> list[dict[str, object]]:
