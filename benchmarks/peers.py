@@ -4,7 +4,7 @@
 
 Installs placo and tsid, each in an environment of its own under build/peers, and lets them balance
 the same robot in the same simulation as copsense's controller, through a pipe (peers_pipe.py). A
-peer that cannot be installed or run is a line with its reason. Takes about ten minutes; --quick
+peer that cannot be installed or run is a line with its reason. Takes about fifteen minutes; --quick
 has one posture and no limits.
 """
 
@@ -37,6 +37,7 @@ from copsense.controllers import (
     Observation,
     PathReference,
     Ramp,
+    Sine,
     lateral_reference,
 )
 from copsense.criterion import Criterion
@@ -50,7 +51,8 @@ BUILD = HERE.parent / "build" / "peers"
 C1, C2 = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
 KNEES = {"straight": 0.0, "knees 0.6 rad": 0.6, "knees 1.0 rad": 1.0}
-REACH, FAR = 0.055, 0.07  # m: the leans without and with limits
+LEAN = Ramp(0.055)
+SWAY, FAR = Sine(0.039, 0.05), Sine(0.07, 0.05)  # of the paper's Section V, and over either foot
 EDGE = 2e-5  # m: a CoP that near has reached it
 SETTLED = 0.05  # s: from when on the contacts carry the robot
 BLOCK, ROUNDS = 50, 40  # states that one controller answers in a row; how often each has its turn
@@ -196,15 +198,15 @@ def _numbers(values: np.ndarray) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-def lean(
-    stance: copsense.Stance, controller: Controller, reference: PathReference, signal: Ramp
+def follow(
+    stance: copsense.Stance, controller: Controller, reference: PathReference, duration: float
 ) -> tuple[Any, float]:
     """A rollout until a contact tips, and how much faster than real time it was on one core.
 
     That is by processor time, which other programs on the machine do not take.
     """
     simulator, began = MujocoSimulator(stance), time.process_time()
-    run = rollout(simulator, controller, Scenario(signal.duration + 0.5, reference))
+    run = rollout(simulator, controller, Scenario(duration, reference))
     spent = time.process_time() - began
     if isinstance(controller, PipeController):
         spent += float(np.sum(controller.seconds, axis=0)[0])
@@ -218,15 +220,20 @@ def edge_reached(run: Any) -> int | None:
     return int(at_edge[0]) if len(at_edge) else None
 
 
-def leans(
-    postures: tuple[str, ...], reach: float, limits: Limits | None, lost: dict[str, str]
+def motions(
+    what: str,
+    postures: tuple[str, ...],
+    signal: Ramp | Sine,
+    limits: Limits | None,
+    lost: dict[str, str],
 ) -> list[str]:
-    """Slow leans of everybody; a peer that fails is noted in `lost`."""
+    """One motion of everybody until a tip or its end; a peer that fails is noted in `lost`."""
+    duration = signal.duration + 0.5 if isinstance(signal, Ramp) else 1.0 / signal.frequency
     lines = [
         "| posture | criterion | controller | CoP at an edge [mm] | first tip [mm] | static path "
         "[mm] | contact (predicted) | CoM y error until the edge [mm rms] | smallest margin "
-        "[mm] | real time factor |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "[mm] | torque norm until the edge [Nm] | real time factor |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     cases = [
         (posture, criterion, peer)
@@ -235,11 +242,11 @@ def leans(
         for peer in (None, *PEERS)
         if peer is None or criterion in peer.criteria
     ]
-    for posture, criterion, peer in tqdm(cases, desc="leans", disable=None):
+    for posture, criterion, peer in tqdm(cases, desc=what, disable=None):
         head = f"| {posture} | {criterion.name} | {peer.name if peer else 'copsense'} | "
         if peer and peer.name in lost:
             continue
-        stance, signal = icub(KNEES[posture]), Ramp(reach)
+        stance = icub(KNEES[posture])
         reference = lateral_reference(stance, signal)
         expected = predict(reference, criterion, limits)
         controller: Any = None
@@ -248,12 +255,12 @@ def leans(
                 controller = peer.controller(stance, criterion, limits)
             else:
                 controller = BalancingController(stance, criterion, limits=limits)
-            run, factor = lean(stance, controller, reference, signal)
+            run, factor = follow(stance, controller, reference, duration)
         except PipeError as error:
             lost[peer.name if peer else ""] = str(error)
             continue
         except CopsenseError as error:
-            lines.append(head + f"failed: {error} | | | | | | |")
+            lines.append(head + f"failed: {error} | | | | | | | |")
             continue
         finally:
             if isinstance(controller, PipeController):
@@ -272,10 +279,11 @@ def leans(
         standing = run.isel(time=slice(0, row)).sel(time=slice(SETTLED, None))
         smallest = float(run["margin"].sel(time=slice(SETTLED, None)).min())
         away = (standing["com"] - standing["com_target"]).sel(com_axis="y").values
+        effort = float(np.linalg.norm(standing["torque"].values, axis=1).mean())
         lines.append(
             head + f"{edge} | {reached} | {static} | {contact} | "
             f"{np.sqrt(np.mean(away**2)) * 1e3:.3f} | "
-            f"{smallest * 1e3:.2f} | {factor:.2f} |"
+            f"{smallest * 1e3:.2f} | {effort:.2f} | {factor:.2f} |"
         )
     return lines
 
@@ -380,8 +388,9 @@ def main() -> None:
         else:
             versions[peer.name] = ", ".join(controller.hello["versions"])
             controller.close()
-    tips = leans(postures[:1] if quick else postures, REACH, None, lost)
-    within = [] if quick else leans(postures[:1], FAR, LIMITS, lost)
+    tips = motions("leans", postures[:1] if quick else postures, LEAN, None, lost)
+    sways = [] if quick else motions("sways", postures[:1], SWAY, None, lost)
+    within = [] if quick else motions("within limits", postures[:1], FAR, LIMITS, lost)
     table = speed(lost)
     text = [
         "# Peers as referees",
@@ -410,9 +419,15 @@ def main() -> None:
         "of the pipe.",
         "",
     ]
-    if within:
+    if not quick:
         text += [
-            "## A lean of 70 mm within limits",
+            "## The sway of [Romano2016] Section V: 39 mm, 0.05 Hz, one period, no limits",
+            "",
+            *sways,
+            "",
+            "The error includes the start: the target sets off at full speed, the robot at rest.",
+            "",
+            "## A sway of 70 mm to either side, 0.05 Hz, one period, within limits",
             "",
             *within,
             "",
