@@ -4,7 +4,7 @@
 
 Installs placo and tsid, each in an environment of its own under build/peers, and lets them balance
 the same robot in the same simulation as copsense's controller, through a pipe (peers_pipe.py). A
-peer that cannot be installed or run is a line with its reason. Takes about ten minutes; --quick
+peer that cannot be installed or run is a line with its reason. Takes about fifteen minutes; --quick
 has one posture and no limits.
 """
 
@@ -26,7 +26,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads its BLA
 import mujoco
 import numpy as np
 import pinocchio as pin
-from balancing import C1, C2, LIMITS, POSTURES, icub
 from peers_pipe import PipeController, PipeError, clock
 from tqdm import tqdm
 
@@ -38,6 +37,7 @@ from copsense.controllers import (
     Observation,
     PathReference,
     Ramp,
+    Sine,
     lateral_reference,
 )
 from copsense.criterion import Criterion
@@ -48,8 +48,11 @@ from copsense.simulation.prediction import predict
 
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "peers"
-BENT = ("straight", "knees 0.6 rad", "knees 1.0 rad")
-REACH, FAR = 0.055, 0.07  # m: the leans without and with limits
+C1, C2 = copsense.minimum_wrench(1.0), copsense.minimum_torque()
+LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
+KNEES = {"straight": 0.0, "knees 0.6 rad": 0.6, "knees 1.0 rad": 1.0}
+LEAN = Ramp(0.055)
+SWAY, FAR = Sine(0.039, 0.05), Sine(0.07, 0.05)  # of the paper's Section V, and over either foot
 EDGE = 2e-5  # m: a CoP that near has reached it
 SETTLED = 0.05  # s: from when on the contacts carry the robot
 BLOCK, ROUNDS = 50, 40  # states that one controller answers in a row; how often each has its turn
@@ -122,6 +125,23 @@ def _clean() -> dict[str, str]:
     return {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
 
 
+def icub(knee: float = 0.0) -> copsense.Stance:
+    """The iCub on soles of 160 x 72 mm, 0.14 m apart, knees bent [rad]."""
+    posture = {}
+    for side in "lr":
+        posture[f"{side}_hip_pitch"], posture[f"{side}_ankle_pitch"] = knee / 2, -knee / 2
+        posture[f"{side}_knee"] = -knee
+    contacts = [
+        copsense.Contact(
+            f"{side}_sole",
+            polygon=copsense.rectangle((-0.0535, 0.1065), reach),
+            offset=(0.0, 0.0, -0.0105),
+        )
+        for side, reach in (("l", (-0.031, 0.041)), ("r", (-0.041, 0.031)))
+    ]
+    return copsense.load_stance("icub", contacts=contacts, posture=posture, width=0.14)
+
+
 def describe(stance: copsense.Stance) -> dict[str, Any]:
     """A stance for a peer: a URDF with the same joints and with frames at the contacts.
 
@@ -178,15 +198,15 @@ def _numbers(values: np.ndarray) -> str:
     return " ".join(repr(float(x)) for x in values)
 
 
-def lean(
-    stance: copsense.Stance, controller: Controller, reference: PathReference, signal: Ramp
+def follow(
+    stance: copsense.Stance, controller: Controller, reference: PathReference, duration: float
 ) -> tuple[Any, float]:
     """A rollout until a contact tips, and how much faster than real time it was on one core.
 
     That is by processor time, which other programs on the machine do not take.
     """
     simulator, began = MujocoSimulator(stance), time.process_time()
-    run = rollout(simulator, controller, Scenario(signal.duration + 0.5, reference))
+    run = rollout(simulator, controller, Scenario(duration, reference))
     spent = time.process_time() - began
     if isinstance(controller, PipeController):
         spent += float(np.sum(controller.seconds, axis=0)[0])
@@ -200,15 +220,20 @@ def edge_reached(run: Any) -> int | None:
     return int(at_edge[0]) if len(at_edge) else None
 
 
-def leans(
-    postures: tuple[str, ...], reach: float, limits: Limits | None, lost: dict[str, str]
+def motions(
+    what: str,
+    postures: tuple[str, ...],
+    signal: Ramp | Sine,
+    limits: Limits | None,
+    lost: dict[str, str],
 ) -> list[str]:
-    """Slow leans of everybody; a peer that fails is noted in `lost`."""
+    """One motion of everybody until a tip or its end; a peer that fails is noted in `lost`."""
+    duration = signal.duration + 0.5 if isinstance(signal, Ramp) else 1.0 / signal.frequency
     lines = [
         "| posture | criterion | controller | CoP at an edge [mm] | first tip [mm] | static path "
         "[mm] | contact (predicted) | CoM y error until the edge [mm rms] | smallest margin "
-        "[mm] | real time factor |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "[mm] | torque norm until the edge [Nm] | real time factor |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     cases = [
         (posture, criterion, peer)
@@ -217,11 +242,11 @@ def leans(
         for peer in (None, *PEERS)
         if peer is None or criterion in peer.criteria
     ]
-    for posture, criterion, peer in tqdm(cases, desc="leans", disable=None):
+    for posture, criterion, peer in tqdm(cases, desc=what, disable=None):
         head = f"| {posture} | {criterion.name} | {peer.name if peer else 'copsense'} | "
         if peer and peer.name in lost:
             continue
-        stance, signal = icub(*POSTURES[posture]), Ramp(reach)
+        stance = icub(KNEES[posture])
         reference = lateral_reference(stance, signal)
         expected = predict(reference, criterion, limits)
         controller: Any = None
@@ -230,12 +255,12 @@ def leans(
                 controller = peer.controller(stance, criterion, limits)
             else:
                 controller = BalancingController(stance, criterion, limits=limits)
-            run, factor = lean(stance, controller, reference, signal)
+            run, factor = follow(stance, controller, reference, duration)
         except PipeError as error:
             lost[peer.name if peer else ""] = str(error)
             continue
         except CopsenseError as error:
-            lines.append(head + f"failed: {error} | | | | | | |")
+            lines.append(head + f"failed: {error} | | | | | | | |")
             continue
         finally:
             if isinstance(controller, PipeController):
@@ -254,10 +279,11 @@ def leans(
         standing = run.isel(time=slice(0, row)).sel(time=slice(SETTLED, None))
         smallest = float(run["margin"].sel(time=slice(SETTLED, None)).min())
         away = (standing["com"] - standing["com_target"]).sel(com_axis="y").values
+        effort = float(np.linalg.norm(standing["torque"].values, axis=1).mean())
         lines.append(
             head + f"{edge} | {reached} | {static} | {contact} | "
             f"{np.sqrt(np.mean(away**2)) * 1e3:.3f} | "
-            f"{smallest * 1e3:.2f} | {factor:.2f} |"
+            f"{smallest * 1e3:.2f} | {effort:.2f} | {factor:.2f} |"
         )
     return lines
 
@@ -353,7 +379,7 @@ def main() -> None:
     quick = parser.parse_args().quick
     BUILD.mkdir(parents=True, exist_ok=True)
     lost: dict[str, str] = {}
-    versions = {}
+    postures, versions = tuple(KNEES), {}
     for peer in PEERS:
         try:
             controller = peer.controller(icub(), C1)
@@ -362,8 +388,9 @@ def main() -> None:
         else:
             versions[peer.name] = ", ".join(controller.hello["versions"])
             controller.close()
-    tips = leans(BENT[:1] if quick else BENT, REACH, None, lost)
-    within = [] if quick else leans(BENT[:1], FAR, LIMITS, lost)
+    tips = motions("leans", postures[:1] if quick else postures, LEAN, None, lost)
+    sways = [] if quick else motions("sways", postures[:1], SWAY, None, lost)
+    within = [] if quick else motions("within limits", postures[:1], FAR, LIMITS, lost)
     table = speed(lost)
     text = [
         "# Peers as referees",
@@ -392,9 +419,15 @@ def main() -> None:
         "of the pipe.",
         "",
     ]
-    if within:
+    if not quick:
         text += [
-            "## A lean of 70 mm within limits",
+            "## The sway of [Romano2016] Section V: 39 mm, 0.05 Hz, one period, no limits",
+            "",
+            *sways,
+            "",
+            "The error includes the start: the target sets off at full speed, the robot at rest.",
+            "",
+            "## A sway of 70 mm to either side, 0.05 Hz, one period, within limits",
             "",
             *within,
             "",

@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from standing import C2, icub, simulator
 
@@ -15,6 +16,7 @@ from copsense.simulation import Scenario, rollout
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
+import peers  # noqa: E402
 from peers_hold import hold  # noqa: E402
 from peers_pipe import PipeController, PipeError  # noqa: E402
 
@@ -108,3 +110,19 @@ def test_a_silent_child_is_not_waited_for_without_end():
 def test_a_child_with_another_robot_is_refused(piped, options, says):
     with pytest.raises(PipeError, match=says):
         piped(**options)
+
+
+def test_a_peer_is_given_the_same_robot_with_frames_at_its_contacts():
+    stance = peers.icub(0.6)
+    given = peers.describe(stance)
+    model = pin.buildModelFromXML(given["urdf"], pin.JointModelFreeFlyer())
+    data = model.createData()
+    assert sorted(list(model.names)[2:]) == sorted(given["joints"])
+    assert pin.computeTotalMass(model) == pytest.approx(stance.robot.mass, rel=1e-12)
+    angles = dict(zip(given["joints"], given["start"][7:], strict=True))
+    q = np.array(given["start"][:7] + [angles[name] for name in list(model.names)[2:]])
+    assert np.allclose(pin.centerOfMass(model, data, q), stance.com, atol=1e-12)
+    pin.framesForwardKinematics(model, data, q)
+    for contact, place in zip(given["contacts"], stance.placements, strict=True):
+        found = data.oMf[model.getFrameId(contact["name"])]
+        assert np.allclose(found.homogeneous, place.homogeneous, atol=1e-9)
