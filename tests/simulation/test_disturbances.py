@@ -5,7 +5,7 @@ import pytest
 from standing import C1, C2, Statue, icub, simulator
 
 import copsense
-from copsense.controllers import BalancingController, load_controller, public_gains
+from copsense.controllers import BalancingController, Sine, load_controller, public_gains
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.simulation import (
     FootOdometry,
@@ -121,6 +121,95 @@ def test_a_robot_stands_on_odometry_with_soft_gains(foot):
     recording = run(Scenario(0.5, odometry=foot), gains=public_gains(icub().robot))
     assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
     assert np.abs(recording["com"] - recording["com"][0]).max() < 1e-3
+
+
+@pytest.mark.parametrize("foot", ["l_sole", "r_sole", "loaded"])
+def test_stiff_gains_stand_odometry_that_begins_when_the_robot_stands(foot):
+    # The sine starts with a jump of the velocity asked for, while the feet are hardly loaded.
+    push = (Push((0.0, 8.0, 0.0), 0.2, 0.05),)
+    for side in (1, -1):
+        sway = Sine(side * 0.01, 0.5)
+        recording = run(Scenario(0.4, sway, push, noise=Noise(0.0, 1e-3), odometry=foot))
+        assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
+
+
+def test_odometry_hands_over_once_and_without_a_jump():
+    stance = icub()
+    odometry = FootOdometry(stance, "loaded")
+    bent, v, wrenches = stance.q.copy(), np.zeros(stance.robot.model.nv), np.zeros((2, 6))
+    bent[stance.robot.model.joints[stance.robot.model.getJointId("r_hip_roll")].idx_q] += 0.02
+    found = []
+    for left in (0.6, 0.46, 0.44, 0.54, 0.56):
+        wrenches[:, 2] = np.array([left, 1 - left]) * stance.robot.weight
+        found.append(odometry.estimate(bent, v, wrenches)[0])
+    assert np.abs(np.array(found) - found[0]).max() < 1e-12
+    # As the left foot has it throughout: where they hand over, nothing moves.
+    alone = FootOdometry(stance, "l_sole").estimate(bent, v, wrenches)[0]
+    assert np.abs(found[-1] - alone).max() < 1e-12
+
+
+def test_odometry_keeps_its_foot_while_another_carries_hardly_more():
+    stance = icub()
+    v, wrenches = np.zeros(stance.robot.model.nv), np.zeros((2, 6))
+    bent = stance.q.copy()
+    bent[stance.robot.model.joints[stance.robot.model.getJointId("r_hip_roll")].idx_q] += 0.02
+    for left, kept in ((0.46, True), (0.44, False)):
+        odometry = FootOdometry(stance, "loaded")
+        wrenches[:, 2] = np.array([left, 1 - left]) * stance.robot.weight
+        odometry.estimate(bent, v, wrenches)  # the right foot moves; is it the one believed in?
+        found = odometry.estimate(stance.q, v, wrenches)[0]
+        assert (np.abs(found[:3] - stance.q[:3]).max() < 1e-9) == kept
+
+
+def test_odometry_is_off_by_what_the_foot_slips():
+    import pinocchio as pin
+
+    stance, seen, law = icub(), [], BalancingController(icub(), C2)
+
+    def controller(observation):
+        seen.append(observation.q)
+        return law(observation)
+
+    scenario = Scenario(
+        0.6,
+        pushes=(Push((10.0, 0.0, 0.0), 0.1, 0.5),),
+        friction=(FrictionChange(5e-3),),
+        odometry="l_sole",
+    )
+    recording = rollout(simulator(), controller, scenario)
+    assert recording.attrs["end_kind"] == "slip"
+    truth = recording["configuration"].values[-1]
+    foot, home = (s.placements[0] for s in (stance.at(truth, check=False), stance))
+    assert foot.translation[0] - home.translation[0] > 0.01
+    base, thought = (pin.XYZQUATToSE3(q[:7]) for q in (truth, seen[-1]))
+    there = home * foot.inverse() * base
+    assert np.abs(there.homogeneous - thought.homogeneous).max() < 1e-9
+
+
+def test_a_foot_that_turns_on_the_spot_slips_too():
+    import pinocchio as pin
+
+    from copsense.simulation import Snapshot, Thresholds
+    from copsense.simulation.watch import Watch
+
+    stance, places = icub(), icub().placements
+    watch = Watch(stance, Thresholds(slip=5e-3))
+    corner = np.linalg.norm(stance.contacts[1].polygon, axis=1).max()
+    for degrees, kind in ((2.0, None), (4.0, "slip")):
+        turn = pin.utils.rpyToMatrix(0.0, 0.0, np.radians(degrees))
+        now = Snapshot(
+            0.0,
+            stance.q,
+            np.zeros(stance.robot.model.nv),
+            np.zeros((2, 6)),
+            np.array([p.translation for p in places]),
+            np.array([places[0].rotation, turn @ places[1].rotation]),
+        )
+        event = watch.contact_event(now)
+        assert (event.kind if event else None) == kind
+        if event:  # the farthest corner moves by a chord
+            chord = 2 * corner * np.sin(np.radians(degrees) / 2)
+            assert f"{chord * 1e3:.1f} mm" in event.message
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def disturbance_options(command: F) -> F:
             "--odometry",
             metavar="CONTACT",
             help="Estimate the base from the joints, taking this foot to stand still, or the one "
-            "that carries most (loaded). Stiff gains do not stand it: --gains public.",
+            "that carries most (loaded).",
         ),
         click.option(
             "--seed", type=int, default=0, show_default=True, help="Of everything random."

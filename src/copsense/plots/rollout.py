@@ -27,6 +27,7 @@ from copsense.plots.style import (
 
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
+_RED = "#b3261e"
 _MOST_NAMED = 6  # joints whose torque has a line of its own in the legend
 
 
@@ -50,9 +51,8 @@ def plot_rollout(dataset: xr.Dataset, *, against: str | None = None) -> Figure:
     _draw_against(panels[1, 2], dataset, colour, against or _hip_roll(dataset))
     for ax in (*panels[0, :2], *panels[1, :2]):
         ax.set_xlabel("time [s]")
-        tip = float(dataset.attrs.get("tip_time", np.nan))
-        if np.isfinite(tip):
-            ax.axvline(tip, color="#b3261e", linewidth=1.0, linestyle=(0, (4, 2)))
+        if _tipped(dataset):
+            _mark_tip(ax, dataset)
     attributes = dataset.attrs
     figure.suptitle(
         f"{attributes['robot']} under {attributes.get('controller', 'a controller')}, "
@@ -63,6 +63,32 @@ def plot_rollout(dataset: xr.Dataset, *, against: str | None = None) -> Figure:
         fontweight="bold",
     )
     return figure
+
+
+def _tipped(dataset: xr.Dataset) -> bool:
+    return bool(np.isfinite(float(dataset.attrs.get("tip_time", np.nan))))
+
+
+def _mark_tip(ax: Axes, dataset: xr.Dataset) -> None:
+    """A line where a contact first ceased to stand, with the word for it."""
+    tip, end = (float(dataset.attrs[name]) for name in ("tip_time", "end_time"))
+    ax.axvline(tip, color=_RED, linewidth=1.0, linestyle=(0, (4, 2)))
+    left = tip > 0.5 * end
+    ax.annotate(
+        str(dataset.attrs.get("tip_kind", "tip")),
+        (tip, 0.03),
+        xycoords=("data", "axes fraction"),
+        xytext=(-4 if left else 4, 0),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        color=_RED,
+        fontsize=9,
+    )
+
+
+def _before(dataset: xr.Dataset) -> str:
+    """What to add to the name of what is shown up to the tip only."""
+    return f", before the {dataset.attrs.get('tip_kind', 'tip')}" if _tipped(dataset) else ""
 
 
 def _colours(contacts: list[str]) -> dict[str, str]:
@@ -122,7 +148,7 @@ def _draw_above(ax: Axes, dataset: xr.Dataset, colour: dict[str, str]) -> None:
     com = dataset["com"].values[rows, :2] * MM
     ax.plot(com[:, 1], com[:, 0], zorder=4, **COM_LINE)
     frame_ground(ax, world_soles(dataset), contact_origins(dataset), com)
-    ax.set_title("from above, before a tip")
+    ax.set_title(f"from above{_before(dataset)}")
 
 
 def _draw_com(ax: Axes, dataset: xr.Dataset) -> None:
@@ -146,7 +172,7 @@ def _draw_torques(ax: Axes, dataset: xr.Dataset) -> None:
         handles += ax.plot(dataset["time"], torque[:, j], color=c, linewidth=1.4, label=names[j])
     reach = 1.15 * float(np.abs(standing).max()) + 0.1
     ax.set_ylim(-reach, reach)
-    ax.set_ylabel("torque, before a tip [Nm]")
+    ax.set_ylabel(f"torque{_before(dataset)} [Nm]")
     put_legend(ax, handles)
 
 
@@ -167,13 +193,17 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, colour: dict[str, str], joint: 
     """CoP y in each foot's frame against a joint or the CoM, the static prediction under it."""
     start = float(dataset["com"].sel(com_axis="y").values[0])
     rows = _standing(dataset)
-    x, label = dataset["com"].sel(com_axis="y").values * MM, "CoM y before a tip [mm]"
+    x, label = dataset["com"].sel(com_axis="y").values * MM, f"CoM y{_before(dataset)} [mm]"
     if joint is not None:
         x, label = (
             dataset["joint_position"].sel(joint=joint).values * DEG,
-            f"{joint} before a tip [deg]",
+            f"{joint}{_before(dataset)} [deg]",
         )
     styles = line_styles(list(colour))
+    if not np.any(np.isfinite(dataset["margin"])):
+        _draw_loads(ax, dataset, colour, x[rows], rows)
+        ax.set_xlabel(label)
+        return
     if "static_cop" in dataset:
         there = (dataset["static_travel"].values + start) * MM
         if joint is not None:
@@ -185,19 +215,46 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, colour: dict[str, str], joint: 
     for k, (name, c) in enumerate(colour.items()):
         cop = dataset["cop"].values[:, k, 1] * MM
         ax.plot(x[rows], cop[rows], color=c, linewidth=1.3, linestyle=styles[name])
-    reach = [np.abs(s).max() for s in _local_soles(dataset)]
-    if reach:
-        ax.set_ylim(-1.3 * max(reach), 1.3 * max(reach))
+    edges = _local_edges(dataset, rows)
+    for found, c in zip(edges, colour.values(), strict=False):
+        for edge in found:
+            ax.axhline(edge, **{**EDGE_LINE, "color": c})
+    if edges:
+        reach = 1.15 * float(np.abs(edges).max())
+        ax.set_ylim(-reach, reach)
     ax.set_xlabel(label)
     ax.set_ylabel("CoP y in the foot's frame [mm]")
     handles = [Line2D([], [], color=c, linestyle=styles[n], label=n) for n, c in colour.items()]
     if "static_cop" in dataset:
         handles.append(Line2D([], [], label="static", **{**_STATIC, "linewidth": 4.0}))
+    if edges:
+        handles.append(Line2D([], [], label="sole's edges", **EDGE_LINE))
     put_legend(ax, handles)
 
 
-def _local_soles(dataset: xr.Dataset) -> list[np.ndarray]:
-    """The lateral reach of each sole in its own frame [mm]."""
+def _draw_loads(
+    ax: Axes, dataset: xr.Dataset, colour: dict[str, str], x: np.ndarray, rows: np.ndarray
+) -> None:
+    """The loads of points, whose centres of pressure do not move."""
+    styles, share = line_styles(list(colour)), 100.0 / float(dataset.attrs["weight"])
+    loads = dataset["wrench"].sel(component="fz").values[rows] * share
+    handles = [
+        ax.plot(x, load, color=c, linestyle=styles[name], label=name)[0]
+        for load, (name, c) in zip(loads.T, colour.items(), strict=True)
+    ]
+    ax.set_ylim(-5.0, 1.15 * float(max(np.nanmax(loads), 10.0)))
+    ax.set_ylabel("normal force [% of the weight]")
+    put_legend(ax, handles)
+
+
+def _local_edges(dataset: xr.Dataset, rows: np.ndarray) -> list[tuple[float, float]]:
+    """Where each sole ends to the right and to the left of its CoPs, in its own frame [mm]."""
     if "sole_polygon" not in dataset:
         return []
-    return [polygon[:, 1] * MM for polygon in dataset["sole_polygon"].values]
+    found = []
+    for k, polygon in enumerate(dataset["sole_polygon"].values):
+        x = dataset["cop"].values[rows, k, 0]
+        middle = float(np.median(x[np.isfinite(x)])) * MM if np.any(np.isfinite(x)) else 0.0
+        across = cross_section(polygon * MM, "y", middle)
+        found.append(across or (polygon[:, 1].min() * MM, polygon[:, 1].max() * MM))
+    return found

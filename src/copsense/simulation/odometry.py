@@ -10,6 +10,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
 LOADED = "loaded"  # the foot that carries most
+_HYSTERESIS = 0.1  # of the weight
 
 
 class FootOdometry:
@@ -17,7 +18,8 @@ class FootOdometry:
 
     What a robot without a tracker of its base does. Where that foot tips or slips, the estimate
     goes with it. With ``"loaded"`` the foot is the one that carries most, by measured normal force;
-    a new one is taken to stand where the last estimate left it.
+    another takes over when it carries more by a tenth of the weight, so that noise does not hand
+    over at every step, and is taken to stand where the last estimate left it.
 
     Args:
         stance: robot and contacts; the feet stand where they do here.
@@ -49,6 +51,7 @@ class FootOdometry:
             place = frame.placement * pin.SE3(c.rotation, np.array(c.offset))
             self._feet.append((int(frame.parentJoint), place))
         self._foot = 0 if self._fixed is None else self._fixed
+        self._weight = stance.robot.weight
 
     def estimate(
         self,
@@ -63,8 +66,9 @@ class FootOdometry:
         pin.computeJointJacobians(model, data, q)
         seen = [data.oMi[joint] * place for joint, place in self._feet]
         if self._fixed is None:
-            most = int(np.argmax(wrenches[self._rows, 2]))
-            if most != self._foot:
+            loads = wrenches[self._rows, 2]
+            most = int(np.argmax(loads))
+            if loads[most] > loads[self._foot] + _HYSTERESIS * self._weight:
                 base = self._places[self._foot] * seen[self._foot].inverse()
                 self._places[most] = base * seen[most]
                 self._foot = most

@@ -28,6 +28,8 @@ from copsense.simulation.simulator import (
 from copsense.simulation.watch import Event, Thresholds, Watch
 from copsense.stance import Stance
 
+_STANDS = 0.9  # share of the weight that the ground must carry,
+_SETTLED = 0.02  # and for how long [s], five time constants of a contact, for odometry to begin
 _REPORT = 50  # control periods between two reports of progress
 
 
@@ -190,6 +192,7 @@ class _Sensors:
         self._wrench_random = np.random.default_rng([scenario.seed, 1])
         noise = self._noise
         self._quiet = not (noise.position or noise.velocity)
+        self._since, self._weight = np.inf, stance.robot.weight
         self._spread = np.repeat([noise.force, noise.moment], 3)
         self._odometry = (
             None if scenario.odometry is None else FootOdometry(stance, scenario.odometry)
@@ -203,9 +206,20 @@ class _Sensors:
             turn[6:] = self._noise.position * self._random.standard_normal(n)
             v[6:] += self._noise.velocity * self._random.standard_normal(n)
             q = pin.integrate(self._model, now.q, turn)
-        if self._odometry:
+        if self._odometry and self._stood(now):
             q, v = self._odometry.estimate(q, v, now.wrenches)
         return q, v
+
+    def _stood(self, now: Snapshot) -> bool:
+        """Whether the robot has stood for a while since the start.
+
+        In a simulation's first milliseconds the ground does not carry yet, and a foot that trembles
+        under no load would pass for a base that flies off: until then the base is known.
+        """
+        if now.time - self._since < _SETTLED:
+            carries = float(now.wrenches[:, 2].sum()) > _STANDS * self._weight
+            self._since = min(self._since, now.time) if carries else np.inf
+        return now.time - self._since >= _SETTLED
 
     def measured(self, now: Snapshot) -> Snapshot:
         if not np.any(self._spread):

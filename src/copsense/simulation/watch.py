@@ -19,7 +19,8 @@ class Thresholds:
     Attributes:
         tilt: a sole turned by more has tipped [rad].
         lift: a contact's origin higher above its plane has left it [m].
-        slip: a contact's origin farther from its place along the plane has slipped [m].
+        slip: a contact of which a corner (or the point) is farther from its place along the plane
+            has slipped [m].
         fall: the CoM lower than this share of its height at the start is a fall.
         base_tilt: so is a base turned by more [rad].
         speed: a joint faster than this is a motion that has diverged [rad/s, m/s].
@@ -65,6 +66,12 @@ class Watch:
         self._normals = np.array([p.rotation[:, 2] for p in stance.placements])
         self._origins = np.array([p.translation for p in stance.placements])
         self._turns = np.array([c.kind != "point" for c in stance.contacts])
+        self._axes = np.array([p.rotation for p in stance.placements])
+        self._corners = [
+            np.zeros((1, 2)) if c.kind == "point" or c.polygon is None else np.array(c.polygon)
+            for c in stance.contacts
+        ]
+        self._reach = np.array([np.linalg.norm(c, axis=1).max() for c in self._corners])
         self._ground = float(self._origins[:, 2].mean())
         self._height = float(stance.com[2]) - self._ground
         self._base = stance.q[3:7]
@@ -75,9 +82,7 @@ class Watch:
     def contact_event(self, now: Snapshot) -> Event | None:
         """The first contact that does not stand any more, if any."""
         tilts = self.tilts(now)
-        moved = now.positions - self._origins
-        lifts = np.einsum("ij,ij->i", moved, self._normals)
-        slips = np.linalg.norm(moved - lifts[:, None] * self._normals, axis=1)
+        lifts = np.einsum("ij,ij->i", now.positions - self._origins, self._normals)
         for k, name in enumerate(self._names):
             if self._turns[k] and tilts[k] > self._limits.tilt:
                 side = "" if now.wrenches[k, 2] > 0 else ", unloaded"
@@ -86,9 +91,30 @@ class Watch:
             if lifts[k] > self._limits.lift:
                 message = f"{name} left the ground by {lifts[k] * 1e3:.1f} mm"
                 return Event("lift", now.time, message, name)
-            if slips[k] > self._limits.slip:
-                return Event("slip", now.time, f"{name} slipped by {slips[k] * 1e3:.1f} mm", name)
+        slips = self.slips(now)
+        k = int(np.argmax(slips))
+        if slips[k] > self._limits.slip:
+            message = (
+                f"{self._names[k]} slipped by {slips[k] * 1e3:.1f} mm, more than "
+                f"{self._limits.slip * 1e3:g} mm"
+            )
+            return Event("slip", now.time, message, self._names[k])
         return None
+
+    def slips(self, now: Snapshot) -> np.ndarray:
+        """How far each contact's farthest corner is from its place along the plane (nc,) [m].
+
+        An upper bound, where even that is under the threshold.
+        """
+        moved = now.positions - self._origins
+        heading = np.abs((now.rotations[:, :, 0] * self._axes[:, :, 1]).sum(axis=1))
+        # A chord is at most sqrt(2) times as long as the sine of a turn up to 90 degrees says.
+        found = np.sqrt((moved * moved).sum(axis=1)) + 1.5 * self._reach * heading
+        for k in np.flatnonzero(found > self._limits.slip):
+            turned = (now.rotations[k] - self._axes[k])[:, :2] @ self._corners[k].T
+            across = self._axes[k][:, :2].T @ (moved[k][:, None] + turned)
+            found[k] = np.linalg.norm(across, axis=0).max()
+        return found
 
     def tilts(self, now: Snapshot) -> np.ndarray:
         """Angle of each contact frame's z axis from its plane's normal (nc,) [rad]."""
