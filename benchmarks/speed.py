@@ -7,7 +7,8 @@ minimum wrench and minimum torque, and the CoPs' exact sensitivity along all 17 
 directions. Every contender's answers are compared with the kernel's first. Then they take turns
 on one core, many short rounds, CPU time. `--peers` also makes an environment under build/ for
 CasADi and JAX with adam (a C compiler is needed; the builds take minutes) and lets them take turns
-from a process on the same core. SPEED_GCC sets the compiler's level (-O1). Scaling, memory and the
+from a process on the same core. SPEED_GCC sets the compiler's level: -O1, because gcc 12
+took over five minutes with -O2, and over eight with -O3. Scaling, memory and the
 latency of single calls follow. Writes benchmarks/speed.md.
 """
 
@@ -237,7 +238,7 @@ def requirements(found: dict[str, Any], medians: dict[str, float]) -> list[str]:
         met = "met" if min(middle, least) >= wanted else "not met"
         if middle >= wanted > least or least >= wanted > middle:
             met = "met by one of the two"
-        text = f"{middle:.0f}x (of the least times {least:.0f}x)"
+        text = f"{middle:.1f}x (of the least times {least:.1f}x)"
         rows.append(f"| {name}: at least {wanted}x | {text} | {met} |")
     middle, least = statistics.median(kernel) * 1e6, min(kernel) * 1e6
     met = "met" if middle <= 3 else "not met"
@@ -291,7 +292,7 @@ def main() -> None:
     found = compare(options, progress)
     alone, facts = scaling.single(progress)
     tables = {
-        "One call of `BatchKernel.one`, by the clock [us]": (
+        "One call of `BatchKernel.one`, by the clock [us], on a machine that others use": (
             "| calls | number | least | p50 | p90 | p99 | p99.9 | most |",
             alone,
         ),
@@ -304,7 +305,7 @@ def main() -> None:
             scaling.counts(options.rounds, progress),
         ),
         "Threads, by the clock": (
-            "| N | threads | us per posture | least | speed-up | of the least |",
+            "| N | threads | us per posture | least | speed-up | of the least | load average |",
             scaling.threads(options.rounds, progress, cores),
         ),
     }

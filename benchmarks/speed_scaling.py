@@ -150,11 +150,14 @@ def threads(rounds: int, progress: Callable[[str], None], cores: set[int]) -> li
         times = interleaved(runs, rounds, progress)
     finally:
         os.sched_setaffinity(0, mine)
+    load = os.getloadavg()[0]  # with the cores taken, a second thread finds none
     rows = []
     for name, each in times.items():
         alone = times[name.rpartition("|")[0] + "| 1"]
         gain = statistics.median(alone) / statistics.median(each), min(alone) / min(each)
-        rows.append(f"| {name} | {microseconds(each)} | {gain[0]:.2f} | {gain[1]:.2f} |")
+        rows.append(
+            f"| {name} | {microseconds(each)} | {gain[0]:.2f} | {gain[1]:.2f} | {load:.1f} |"
+        )
     return rows
 
 

@@ -63,6 +63,7 @@ class BatchKernel:
             )
         self.names = tuple(names)
         self._single: Any = None
+        self._nq = stance.robot.model.nq
         self._shapes = {name: a.shape for name, a in _arrays(self.empty(0)).items()}
         self._choices = choices(stance, self.criteria)
         self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
@@ -116,14 +117,13 @@ class BatchKernel:
         if self._single is None:
             self._single = self._single_kernel()
         single, row = self._single, q
-        if not _is_row(row, self.stance.robot.model.nq):
+        if not _is_row(row, self._nq):
             row = self.stance.robot.check_configuration(row)
         if isinstance(single, BatchResult):
             result, doubtful = single, list(range(len(self.names)))
         else:
-            single.evaluate(row[None])
             result = single.result
-            if not single.doubtful.any():
+            if not single.evaluate(row[None]):
                 return result
             doubtful = [int(j) for j in np.flatnonzero(single.doubtful)]
         self.stance.robot.check_configuration(row)

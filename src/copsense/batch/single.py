@@ -46,9 +46,9 @@ class Single:
         self.doubtful = values[ends[-1] :]
         self._values, self._W = values, workspace(rows.size, width=1)
 
-    def evaluate(self, q: np.ndarray) -> None:
-        """Fill the result for a configuration (1, nq), contiguous."""
-        run_single(self._ints, self._floats, q, self._values, self._W)
+    def evaluate(self, q: np.ndarray) -> bool:
+        """Fill the result for a configuration (1, nq), contiguous; whether any is in doubt."""
+        return bool(run_single(self._ints, self._floats, q, self._values, self._W))
 
 
 def pack(
@@ -82,8 +82,11 @@ def pack(
 
 
 @compiled
-def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> None:
-    """Unpack, and evaluate the one configuration q (1, nq) into `values`, as `Single` lays out."""
+def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> bool:
+    """Unpack, and evaluate the one configuration q (1, nq) into `values`, as `Single` lays out.
+
+    Returns whether a criterion is in doubt, which takes NumPy longer to tell.
+    """
     b, nc, ns, ng, held, unknowns, nk, ne, gains = (
         ints[0],
         ints[1],
@@ -164,3 +167,7 @@ def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> None:
         values[a7 + 3 : a7 + 3 + nr].reshape(1, nr),
     )
     run(tree, feet, Choices(columns, kinds, joint, force, arm), rows, q, out, W, 0, 1, 1)
+    doubt = 0.0
+    for column in range(nr):
+        doubt += values[a7 + 3 + column]
+    return doubt > 0.0
