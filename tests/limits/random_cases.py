@@ -113,11 +113,14 @@ def random_limits(stance, criterion, rng):
             torque = {names[i]: float(rng.uniform(0.5, 1.5) * free[i] + 0.5) for i in chosen}
     torsion = rng.choice([None, "contact", "number", "cone"], p=[0.2, 0.35, 0.2, 0.25])
     cone = torsion == "cone"
+    friction = rng.choice([None, "contact", "number"], p=[0.2, 0.55, 0.25])
+    if friction == "number" or (cone and friction is None):
+        friction = float(rng.uniform(0.2, 1.0))
     sides = SIDES[rng.integers(4 if cone else len(SIDES))]
     normal = rng.choice([None, 0.0, 0.05 * stance.robot.weight], p=[0.1, 0.5, 0.4])
     chosen = Limits(
         normal_force=normal,
-        friction="contact" if cone or rng.random() < 0.8 else None,
+        friction=friction,
         friction_sides=int(sides),
         cop_margin=[None, 0.0, 0.004][rng.choice(3, p=[0.15, 0.5, 0.35])],
         torsion=float(rng.uniform(0.0, 0.05)) if torsion == "number" else torsion,

@@ -85,7 +85,7 @@ def contact_inequalities(contact, limits):
     if limits.normal_force is not None:
         rows.append(-fz)
         bounds.append(-limits.normal_force)
-    mu = contact.friction if limits.friction is not None else None
+    mu = contact.friction if limits.friction == "contact" else limits.friction
     if mu is not None:
         if contact.kind == "planar":
             rows += [fy - mu * fz, -fy - mu * fz]
@@ -110,9 +110,8 @@ def contact_inequalities(contact, limits):
         if limits.torsion == "cone":
             rows += list(wrench_cone(contact.polygon, mu, limits.friction_sides))
         elif limits.torsion is not None:
-            coefficient = contact.torsional_friction
-            if coefficient is None and limits.torsion != "contact":
-                coefficient = limits.torsion
+            own = limits.torsion == "contact"
+            coefficient = contact.torsional_friction if own else limits.torsion
             if coefficient is not None:
                 rows += [mz - coefficient * fz, -mz - coefficient * fz]
         bounds += [0.0] * (len(rows) - len(bounds))
