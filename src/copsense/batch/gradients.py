@@ -34,10 +34,10 @@ from copsense.batch.lanes import (
     sub3,
 )
 from copsense.batch.layout import PRISMATIC, Feet, Tree
-from copsense.batch.loops import expand, gather_groups, solve_lower, solve_upper
+from copsense.batch.loops import expand, gather_groups, times_lower, times_upper
 from copsense.batch.rows import Rows
 from copsense.batch.sharing import across_symmetric
-from copsense.batch.tangents import project, store_base_and_joints
+from copsense.batch.tangents import project, store_base
 
 
 @compiled
@@ -98,13 +98,11 @@ def torque_gradients(
 @compiled
 def _lever_arms(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
     """A_j = [0; dh/dq_j x g] + s_j x* phi_j, the same for every output."""
-    g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
     for t in range(len(feet.support)):
         i, phi = feet.support[t], rows.group + 6 * feet.group[t]
         F, M = screw_cross(W, rows.screw + 6 * i, load3(W, phi), load3(W, phi + 3))
         store3(W, rows.lever_arm + 6 * t, F)
-        weight = cross3(load3(W, rows.moment_rate + 3 * i), g)
-        store3(W, rows.lever_arm + 6 * t + 3, add3(M, weight))
+        store3(W, rows.lever_arm + 6 * t + 3, add3(M, load3(W, rows.weight + 3 * i)))
 
 
 @compiled
@@ -141,9 +139,9 @@ def _adjoint(
             store3(W, at, scale3(sign, own))
             if not feet.point[e]:
                 store3(W, at + 3, scale3(sign, w))
-    R = rows.Rw if weighted else rows.R
-    solve_lower(W, R, rows.unknown, r)
-    solve_upper(W, R, rows.unknown, r)
+    T = rows.Tw if weighted else rows.T
+    times_lower(W, T, rows.unknown, r)
+    times_upper(W, T, rows.unknown, r)
     expand(feet, rows, W, rows.unknown, rows.nothing, rows.inner)
     gather_groups(feet, W, rows.inner, rows.inner_group)
     if held != k:
@@ -176,13 +174,12 @@ def _sweep(
     weighted = choices.kind[index] == WEIGHTED
     g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
     base = load3(W, rows.twist)
-    store_base_and_joints(tree, rows, W, at, cross3(base, g))
+    store_base(tree, rows, W, at, cross3(base, g))
     for t in range(ns):
         i, up = feet.support[t], feet.anchor[feet.support[t]]
         omega = load3(W, rows.turning + 3 * up) if up >= 0 else base
         rate = load(W, rows.rate + t)
-        drive = cross3(omega, g)
-        store(W, rows.felt + t, dot3(load3(W, rows.moment_rate + 3 * i), drive))
+        store(W, rows.felt + t, -dot3(omega, load3(W, rows.weight + 3 * i)))
         if tree.kind[i] != PRISMATIC:
             omega = add3(omega, scale3(rate, load3(W, rows.screw + 6 * i + 3)))
         store3(W, rows.turning + 3 * t, omega)
@@ -205,8 +202,7 @@ def _sweep(
         above = rows.pull + 6 * up if up >= 0 else at
         store3(W, above, add3(load3(W, above), F))
         store3(W, above + 3, add3(load3(W, above + 3), M))
-    # Joints that hang on a moving support joint but carry no contact.
-    for i in range(1, len(tree.parent)):
-        if feet.anchor[i] >= 0:
-            drive = cross3(load3(W, rows.turning + 3 * feet.anchor[i]), g)
-            store(W, at + 5 + i, dot3(load3(W, rows.moment_rate + 3 * i), drive))
+    for i in feet.rest:
+        up = feet.anchor[i]
+        omega = load3(W, rows.turning + 3 * up) if up >= 0 else base
+        store(W, at + 5 + i, -dot3(omega, load3(W, rows.weight + 3 * i)))

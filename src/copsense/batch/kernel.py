@@ -11,7 +11,19 @@ from copsense.batch.gains import com_gains, com_motions, margins
 from copsense.batch.gradients import torque_gradients, wrench_gradients
 from copsense.batch.inertia import factorise_inertia
 from copsense.batch.kinematics import move, place_feet
-from copsense.batch.lanes import along, compiled, get, load, load3, put, store, store3
+from copsense.batch.lanes import (
+    WIDTH,
+    along,
+    compiled,
+    get,
+    load,
+    load3,
+    put,
+    read_lanes,
+    store,
+    store3,
+    write_lanes,
+)
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.loops import build
 from copsense.batch.rows import Rows
@@ -58,11 +70,7 @@ def run(
     gains = len(out.com_gain) > 0
     for first in range(start, stop, width):
         count = min(width, stop - first)
-        for lane in range(width):
-            # The last ones are repeated where too few are left to fill the lanes.
-            at = first + min(lane, count - 1)
-            for column in range(q.shape[1]):
-                put(W, rows.q + column, lane, q[at, column])
+        _read(W, rows.q, q, first, count, width)
         move(tree, rows, W)
         place_feet(feet, rows, W)
         build(feet, rows, W)
@@ -92,16 +100,16 @@ def run(
                 store3(W, at, along(W, rows.rotation, load3(W, at)))
                 store3(W, at + 3, along(W, rows.rotation, load3(W, at + 3)))
             column = choices.column[index]
+            _write(W, rows.contact_wrench, out.wrenches, first, count, column)
+            _write(W, rows.torque + 1, out.torques, first, count, column)
+            _write(W, rows.cop, out.cops, first, count, column)
+            _write(W, rows.gradient, out.gradient, first, count, column)
+            _write(W, rows.margin, out.margin, first, count, column)
+            if gains:
+                _write(W, rows.gain, out.com_gain, first, count, column)
+                _write(W, rows.travel, out.com_travel, first, count, column)
             for lane in range(count):
                 row = first + lane
-                _copy(W, rows.contact_wrench, lane, out.wrenches[row, column])
-                _copy(W, rows.torque + 1, lane, out.torques[row, column])
-                _copy(W, rows.cop, lane, out.cops[row, column])
-                _copy(W, rows.gradient, lane, out.gradient[row, column])
-                _copy(W, rows.margin, lane, out.margin[row, column])
-                if gains:
-                    _copy(W, rows.gain, lane, out.com_gain[row, column])
-                    _copy(W, rows.travel, lane, out.com_travel[row, column])
                 for k in range(nc):
                     share = get(W, rows.contact_wrench + 6 * k + 2, lane) / feet.weight
                     out.load_share[row, column, k] = share
@@ -114,6 +122,48 @@ def run(
 
 
 @compiled
-def _copy(W: Any, row: int, lane: int, values: Any) -> None:
-    for i in range(len(values)):
-        values[i] = get(W, row + i, lane)
+def _read(W: Any, row: int, q: Any, first: int, count: int, width: int) -> None:
+    """Configurations first to first + count; the last is repeated where they do not fill `width`.
+
+    Lanes are read in squares, the last of which overlaps the one before.
+    """
+    n = q.shape[1]
+    if W.ndim == 2 and n >= WIDTH:
+        last = first + count - 1
+        for block in range(0, n, WIDTH):
+            i = min(block, n - WIDTH)
+            read_lanes(
+                W,
+                row + i,
+                q,
+                (
+                    n * first + i,
+                    n * min(first + 1, last) + i,
+                    n * min(first + 2, last) + i,
+                    n * min(first + 3, last) + i,
+                    n * min(first + 4, last) + i,
+                    n * min(first + 5, last) + i,
+                    n * min(first + 6, last) + i,
+                    n * min(first + 7, last) + i,
+                ),
+            )
+        return
+    for lane in range(width):
+        at = first + min(lane, count - 1)
+        for i in range(n):
+            put(W, row + i, lane, q[at, i])
+
+
+@compiled
+def _write(W: Any, row: int, values: Any, first: int, count: int, column: int) -> None:
+    """Rows of a workspace as values[first : first + count, column], in squares where they fit."""
+    n, stride = values.shape[2], values.shape[1] * values.shape[2]
+    if W.ndim == 2 and n >= WIDTH and count == WIDTH:
+        start = stride * first + n * column
+        for block in range(0, n, WIDTH):
+            i = min(block, n - WIDTH)
+            write_lanes(W, row + i, values, start + i, stride)
+        return
+    for lane in range(count):
+        for i in range(n):
+            values[first + lane, column, i] = get(W, row + i, lane)

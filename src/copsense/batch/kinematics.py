@@ -145,6 +145,7 @@ def _carry(tree: Tree, rows: Rows, W: Any) -> None:
             store3(W, rows.screw + 6 * i, cross3(p, a))
             store3(W, rows.screw + 6 * i + 3, a)
         store3(W, rows.moment_rate + 3 * i, rate)
+        store3(W, rows.weight + 3 * i, cross3(rate, g))
         store(W, rows.gravity + i, -dot3(rate, g))
 
 

@@ -265,6 +265,68 @@ def _element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.gep(builder.bitcast(pointer, number), [lane])
 
 
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """The columns of a square of lanes: halves are exchanged at distance 1, 2, 4."""
+    mask, distance = ir.VectorType(ir.IntType(32), WIDTH), 1
+    while distance < WIDTH:
+        low = [p if not p & distance else WIDTH + p - distance for p in range(WIDTH)]
+        high = [p + distance if not p & distance else WIDTH + p for p in range(WIDTH)]
+        for i in range(WIDTH):
+            if not i & distance:
+                a, b = rows[i], rows[i + distance]
+                rows[i] = builder.shuffle_vector(a, b, ir.Constant(mask, low))
+                rows[i + distance] = builder.shuffle_vector(a, b, ir.Constant(mask, high))
+        distance *= 2
+    return rows
+
+
+def _addresses(context: Any, builder: Any, given: Any, array: Any, starts: list[Any]) -> list[Any]:
+    """Addresses of `WIDTH` floats each in a contiguous array, from its flat indices."""
+    vector = ir.VectorType(ir.DoubleType(), WIDTH).as_pointer()
+    data = cgutils.create_struct_proxy(given)(context, builder, value=array).data
+    return [builder.bitcast(builder.gep(data, [start]), vector) for start in starts]
+
+
+@_primitive
+def read_lanes(typing: Any, W: Any, row: Any, array: Any, starts: Any) -> Any:
+    """Into `WIDTH` rows of a workspace of lanes: array.flat[start :][:WIDTH], a posture each."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        at = [builder.extract_value(args[3], k) for k in range(WIDTH)]
+        found = _addresses(context, builder, sig.args[2], args[2], at)
+        columns = _transposed(builder, [builder.load(p, align=8) for p in found])
+        step = ir.Constant(args[1].type, 1)
+        index = args[1]
+        for column in columns:
+            pointer, _ = _pointer(context, builder, sig, (args[0], index))
+            builder.store(column, pointer, align=8)
+            index = builder.add(index, step)
+        return context.get_dummy_value()
+
+    return types.void(W, types.intp, array, types.UniTuple(types.intp, WIDTH)), generate
+
+
+@_primitive
+def write_lanes(typing: Any, W: Any, row: Any, array: Any, start: Any, stride: Any) -> Any:
+    """From `WIDTH` rows: array.flat[start + stride * lane :][:WIDTH] of each posture."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        step = ir.Constant(args[1].type, 1)
+        index, rows, at, places = args[1], [], args[3], []
+        for _ in range(WIDTH):
+            pointer, _kind = _pointer(context, builder, sig, (args[0], index))
+            rows.append(builder.load(pointer, align=8))
+            index = builder.add(index, step)
+            places.append(at)
+            at = builder.add(at, args[4])
+        found = _addresses(context, builder, sig.args[2], args[2], places)
+        for value, place in zip(_transposed(builder, rows), found, strict=True):
+            builder.store(value, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(W, types.intp, array, types.intp, types.intp), generate
+
+
 def _map(name: str) -> Any:
     """One of LLVM's functions of a number, lane by lane."""
 

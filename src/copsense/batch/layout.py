@@ -70,6 +70,7 @@ class Feet(NamedTuple):
         group: group of each support joint (ns,).
         member: whether a group holds a contact (ng, nc).
         anchor: support joint nearest above each body, as an index into `support`; -1: the base.
+        rest: bodies of the joints that carry no contact (n - ns,).
         edges: half-planes (a_x, a_y, b) of every sole, inside where a p <= b (e, 3).
         edge_first: first of each contact's half-planes, and the end (nc + 1,).
         weight: m |g| [N].
@@ -88,6 +89,7 @@ class Feet(NamedTuple):
     group: np.ndarray
     member: np.ndarray
     anchor: np.ndarray
+    rest: np.ndarray
     edges: np.ndarray
     edge_first: np.ndarray
     weight: float
@@ -224,6 +226,7 @@ def _feet(stance: Stance, turns: list[np.ndarray], edges: list[np.ndarray]) -> F
         group,
         member,
         anchor,
+        np.setdiff1d(np.arange(1, robot.model.njoints - 1), support),
         np.vstack([np.zeros((0, 3)), *edges]),
         ends.astype(np.int64),
         robot.weight,

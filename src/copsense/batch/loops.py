@@ -86,6 +86,7 @@ def build(feet: Feet, rows: Rows, W: Any) -> None:
                 if not feet.point[k]:
                     store(W, at + ns * (3 + j), w[j])
     lost = factorise(W, rows.Q, rows.R, ns, feet.unknowns)
+    invert_upper(W, rows.R, rows.T, feet.unknowns)
     store(W, rows.flag, where_less(lost, 0.5, load(W, rows.flag), splat(W, 1.0)))
 
 
@@ -172,11 +173,10 @@ def factorise(W: Any, A: int, R: int, m: int, r: int) -> Any:
     """
     lost = splat(W, 0.0)
     for j in range(r):
+        store(W, R + r * j + j, _square(W, A + m * j, m))
+    for j in range(r):
         a = A + m * j
-        before = _square(W, a, m)
-        for k in range(j):
-            store(W, R + r * k + j, _take_off(W, a, A + m * k, m, splat(W, 1.0)))
-        after = _square(W, a, m)
+        before, after = load(W, R + r * j + j), _square(W, a, m)
         if any_less(after, before * _REPEAT):
             again = where_less(after, before * _REPEAT, splat(W, 1.0), splat(W, 0.0))
             for k in range(j):
@@ -189,6 +189,9 @@ def factorise(W: Any, A: int, R: int, m: int, r: int) -> Any:
         inverse = 1.0 / length
         for i in range(m):
             store(W, a + i, load(W, a + i) * inverse)
+        # Off the columns to come at once: these do not wait for one another.
+        for k in range(j + 1, r):
+            store(W, R + r * j + k, _take_off(W, A + m * k, a, m, splat(W, 1.0)))
     return lost
 
 
@@ -213,23 +216,36 @@ def _take_off(W: Any, a: int, q: int, m: int, share: Any) -> Any:
 
 
 @compiled
-def solve_upper(W: Any, R: int, x: int, r: int) -> None:
-    """x := R^-1 x."""
-    for i in range(r - 1, -1, -1):
-        s = load(W, x + i)
-        for j in range(i + 1, r):
-            s = s - load(W, R + r * i + j) * load(W, x + j)
-        store(W, x + i, s / load(W, R + r * i + i))
+def invert_upper(W: Any, R: int, T: int, r: int) -> None:
+    """T = R^-1. Products with it need no number before the last, unlike back substitution."""
+    for j in range(r):
+        last = 1.0 / load(W, R + r * j + j)
+        store(W, T + r * j + j, last)
+        for i in range(j):
+            s = load(W, T + r * i + i) * load(W, R + r * i + j)
+            for k in range(i + 1, j):
+                s = s + load(W, T + r * i + k) * load(W, R + r * k + j)
+            store(W, T + r * i + j, -(s * last))
 
 
 @compiled
-def solve_lower(W: Any, R: int, x: int, r: int) -> None:
-    """x := R^-T x."""
+def times_upper(W: Any, T: int, x: int, r: int) -> None:
+    """x := T x, T upper triangular."""
     for i in range(r):
-        s = load(W, x + i)
+        s = load(W, T + r * i + i) * load(W, x + i)
+        for j in range(i + 1, r):
+            s = s + load(W, T + r * i + j) * load(W, x + j)
+        store(W, x + i, s)
+
+
+@compiled
+def times_lower(W: Any, T: int, x: int, r: int) -> None:
+    """x := T' x, T upper triangular."""
+    for i in range(r - 1, -1, -1):
+        s = load(W, T + r * i + i) * load(W, x + i)
         for j in range(i):
-            s = s - load(W, R + r * j + i) * load(W, x + j)
-        store(W, x + i, s / load(W, R + r * i + i))
+            s = s + load(W, T + r * j + i) * load(W, x + j)
+        store(W, x + i, s)
 
 
 @compiled

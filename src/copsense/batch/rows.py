@@ -22,6 +22,7 @@ class Rows(NamedTuple):
         first_moment: h of each body and all it carries (n + 1, 3).
         screw: s of each joint, the twist that its unit velocity gives what it carries (n + 1, 6).
         moment_rate: dh/dq of each joint (n + 1, 3).
+        weight: dh/dq x g of each joint (n + 1, 3).
         gravity: G of each joint (n + 1,).
         foot_rotation: contact axes, three columns (nc, 9).
         foot: origin of each contact frame, r (nc, 3).
@@ -29,16 +30,18 @@ class Rows(NamedTuple):
         held_row: torque of each support joint per wrench on the held contacts, d (ns, 6).
         Q: the loop matrix, then its orthonormal factor, by columns (r, ns).
         R: its triangular factor, by rows (r, r).
+        T: R^-1 (r, r).
         Qw: the same for a criterion with weights, rows of the wrenches below (r, ns + 6 nc).
         Rw: its triangular factor (r, r).
+        Tw: Rw^-1 (r, r).
         right: right-hand side of the least squares (ns + 6 nc,).
         C: what completes Q to the row space of J, joints' part by columns (6, ns).
-        L: Cholesky factor of 1 + C'C (6, 6).
+        L: inverse of the Cholesky factor of 1 + C'C (6, 6).
         level: gradient of the CoM moment along the two level directions, projected (2, nv).
         unknown: y or its adjoint (r,).
-        six: a projection's coefficients (6,).
+        six: a projection's coefficients (2, 6).
         felt: a gradient on the support joints (ns,).
-        tangential: R^-T of an adjoint's right-hand side (r,).
+        along: a gradient's part along Q (r,).
         load: b, what the contacts' wrenches sum up to (6,).
         nothing: zeros (6,).
         wrench: phi of each contact (nc, 6).
@@ -76,6 +79,7 @@ class Rows(NamedTuple):
     first_moment: int
     screw: int
     moment_rate: int
+    weight: int
     gravity: int
     foot_rotation: int
     foot: int
@@ -83,8 +87,10 @@ class Rows(NamedTuple):
     held_row: int
     Q: int
     R: int
+    T: int
     Qw: int
     Rw: int
+    Tw: int
     right: int
     C: int
     L: int
@@ -92,7 +98,7 @@ class Rows(NamedTuple):
     unknown: int
     six: int
     felt: int
-    tangential: int
+    along: int
     load: int
     nothing: int
     wrench: int
@@ -136,6 +142,7 @@ def rows(layout: Layout, nq: int) -> Rows:
         "first_moment": 3 * (n + 1),
         "screw": 6 * (n + 1),
         "moment_rate": 3 * (n + 1),
+        "weight": 3 * (n + 1),
         "gravity": n + 1,
         "foot_rotation": 9 * nc,
         "foot": 3 * nc,
@@ -143,16 +150,18 @@ def rows(layout: Layout, nq: int) -> Rows:
         "held_row": 6 * ns,
         "Q": r * ns,
         "R": r * r,
+        "T": r * r,
         "Qw": r * (ns + 6 * nc),
         "Rw": r * r,
+        "Tw": r * r,
         "right": ns + 6 * nc,
         "C": 6 * ns,
         "L": 36,
         "level": 2 * nv,
         "unknown": r,
-        "six": 6,
+        "six": 12,
         "felt": ns,
-        "tangential": r,
+        "along": r,
         "load": 6,
         "nothing": 6,
         "wrench": 6 * nc,

@@ -41,7 +41,8 @@ from copsense.batch.loops import (
     gather_groups,
     invert_spread,
     second_moment,
-    solve_upper,
+    invert_upper,
+    times_upper,
 )
 from copsense.batch.rows import Rows
 
@@ -111,16 +112,16 @@ def least_squares(feet: Feet, rows: Rows, W: Any, choices: Choices, index: int) 
         if weighted:
             tau = tau * np.sqrt(choices.joint[index, feet.support[t]])
         store(W, rows.right + t, tau)
-    Q, R, m = rows.Q, rows.R, ns
+    Q, T, m = rows.Q, rows.T, ns
     if weighted:
-        Q, R, m = rows.Qw, rows.Rw, ns + 6 * len(feet.body)
+        Q, T, m = rows.Qw, rows.Tw, ns + 6 * len(feet.body)
         _weigh(feet, rows, W, choices, index)
     for i in range(r):
         s = load(W, Q + m * i) * load(W, rows.right)
         for t in range(1, m):
             s = s + load(W, Q + m * i + t) * load(W, rows.right + t)
         store(W, rows.unknown + i, s)
-    solve_upper(W, R, rows.unknown, r)
+    times_upper(W, T, rows.unknown, r)
     expand(feet, rows, W, rows.unknown, rows.load, rows.wrench)
 
 
@@ -148,6 +149,7 @@ def _weigh(feet: Feet, rows: Rows, W: Any, choices: Choices, index: int) -> None
     expand(feet, rows, W, rows.unknown, rows.load, rows.inner)
     _wrench_rows(feet, rows, W, choices, index, rows.inner, rows.right + ns, -1.0)
     lost = factorise(W, rows.Qw, rows.Rw, m, r)
+    invert_upper(W, rows.Rw, rows.Tw, r)
     store(W, rows.doubt, where_less(lost, 0.5, load(W, rows.doubt), splat(W, 1.0)))
 
 

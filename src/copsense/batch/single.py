@@ -72,7 +72,7 @@ def pack(
         names,
     ]
     whole = [tree.parent, tree.kind, tree.column, feet.body, feet.point, feet.order, feet.first]
-    whole += [feet.support, feet.group, feet.member, feet.anchor, feet.edge_first]
+    whole += [feet.support, feet.group, feet.member, feet.anchor, feet.rest, feet.edge_first]
     whole += [choices.column, choices.kind, np.array(rows)]
     real = [tree.placement, tree.mass, tree.moment, tree.inertia, tree.carried, tree.gravity]
     real += [tree.level, feet.placement, feet.axes, feet.plane, feet.edges, choices.joint]
@@ -108,8 +108,10 @@ def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> bool:
     i += 2 * ns
     member = ints[i : i + ng * nc].reshape(ng, nc)
     i += ng * nc
-    anchor, edge_first = ints[i : i + b], ints[i + b : i + b + nc + 1]
-    i += b + nc + 1
+    anchor, rest = ints[i : i + b], ints[i + b : i + 2 * b - 1 - ns]
+    i += 2 * b - 1 - ns
+    edge_first = ints[i : i + nc + 1]
+    i += nc + 1
     columns, kinds = ints[i : i + nk], ints[i + nk : i + 2 * nk]
     rows = Rows(*as_tuple(ints[i + 2 * nk :], _ROWS))
     placement, f = floats[: 12 * b].reshape(b, 12), 12 * b
@@ -141,6 +143,7 @@ def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> bool:
         group,
         member,
         anchor,
+        rest,
         edges,
         edge_first,
         weight,

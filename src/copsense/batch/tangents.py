@@ -18,13 +18,13 @@ from copsense.batch.rows import Rows
 
 @compiled
 def span(feet: Feet, rows: Rows, W: Any) -> None:
-    """C, and the Cholesky factor of 1 + C' C."""
+    """C, and the inverse L^-1 of the Cholesky factor of 1 + C' C."""
     ns = len(feet.support)
     for j in range(6):
         c = rows.C + ns * j
         for t in range(ns):
             store(W, c + t, load(W, rows.held_row + 6 * t + j))
-        _remove(W, rows.Q, feet.unknowns, c, ns)
+        _remove(feet, rows, W, c)
     for i in range(6):
         for j in range(i + 1):
             s = splat(W, 1.0 if i == j else 0.0)
@@ -36,45 +36,58 @@ def span(feet: Feet, rows: Rows, W: Any) -> None:
                 store(W, rows.L + 6 * i + i, 1.0 / root(s))  # the diagonal is kept inverted
             else:
                 store(W, rows.L + 6 * i + j, s * load(W, rows.L + 6 * j + j))
+    for i in range(1, 6):
+        for j in range(i):
+            s = load(W, rows.L + 6 * i + j) * load(W, rows.L + 6 * j + j)
+            for k in range(j + 1, i):
+                s = s + load(W, rows.L + 6 * i + k) * load(W, rows.L + 6 * k + j)
+            store(W, rows.L + 6 * i + j, -(s * load(W, rows.L + 6 * i + i)))
 
 
 @compiled
-def _remove(W: Any, Q: int, r: int, g: int, ns: int) -> None:
-    """g -= Q Q' g, column by column (Q is orthonormal: the order does not matter)."""
+def _remove(feet: Feet, rows: Rows, W: Any, g: int) -> None:
+    """g -= Q Q' g. Q is orthonormal: no product has to wait for another."""
+    ns, r = len(feet.support), feet.unknowns
     for k in range(r):
-        q = Q + ns * k
+        q = rows.Q + ns * k
         c = load(W, q) * load(W, g)
         for t in range(1, ns):
             c = c + load(W, q + t) * load(W, g + t)
-        for t in range(ns):
-            store(W, g + t, load(W, g + t) - c * load(W, q + t))
+        store(W, rows.along + k, c)
+    for t in range(ns):
+        s = load(W, g + t)
+        for k in range(r):
+            s = s - load(W, rows.along + k) * load(W, rows.Q + ns * k + t)
+        store(W, g + t, s)
 
 
 @compiled
 def project(feet: Feet, rows: Rows, W: Any, gradient: int, felt: int) -> None:
     """Project a gradient (nv,), base part in world axes; `felt` holds it on the support joints."""
     ns = len(feet.support)
-    _remove(W, rows.Q, feet.unknowns, felt, ns)
-    y = rows.six
+    _remove(feet, rows, W, felt)
+    y, z = rows.six, rows.six + 6
     for i in range(6):
         s = load(W, gradient + i)
         for t in range(ns):
             s = s + load(W, rows.C + ns * i + t) * load(W, felt + t)
-        for k in range(i):
-            s = s - load(W, rows.L + 6 * i + k) * load(W, y + k)
-        store(W, y + i, s * load(W, rows.L + 6 * i + i))
-    for i in range(5, -1, -1):
-        s = load(W, y + i)
-        for k in range(i + 1, 6):
-            s = s - load(W, rows.L + 6 * k + i) * load(W, y + k)
-        store(W, y + i, s * load(W, rows.L + 6 * i + i))
+        store(W, y + i, s)
     for i in range(6):
-        c = load(W, y + i)
-        store(W, gradient + i, load(W, gradient + i) - c)
-        for t in range(ns):
-            store(W, felt + t, load(W, felt + t) - c * load(W, rows.C + ns * i + t))
+        s = load(W, rows.L + 6 * i) * load(W, y)
+        for k in range(1, i + 1):
+            s = s + load(W, rows.L + 6 * i + k) * load(W, y + k)
+        store(W, z + i, s)
+    for i in range(6):
+        s = load(W, rows.L + 6 * i + i) * load(W, z + i)
+        for k in range(i + 1, 6):
+            s = s + load(W, rows.L + 6 * k + i) * load(W, z + k)
+        store(W, y + i, s)
+        store(W, gradient + i, load(W, gradient + i) - s)
     for t in range(ns):
-        store(W, gradient + 5 + feet.support[t], load(W, felt + t))
+        s = load(W, felt + t)
+        for i in range(6):
+            s = s - load(W, y + i) * load(W, rows.C + ns * i + t)
+        store(W, gradient + 5 + feet.support[t], s)
 
 
 @compiled
@@ -93,8 +106,14 @@ def level_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
 @compiled
 def store_base_and_joints(tree: Tree, rows: Rows, W: Any, at: int, u: Any) -> None:
     """Gradient (nv,) of h . u at fixed u: the base in world axes, then the joints."""
+    store_base(tree, rows, W, at, u)
+    for i in range(1, len(tree.parent)):
+        store(W, at + 5 + i, dot3(load3(W, rows.moment_rate + 3 * i), u))
+
+
+@compiled
+def store_base(tree: Tree, rows: Rows, W: Any, at: int, u: Any) -> None:
+    """The base's part of it (6,)."""
     m = tree.carried[0]
     store3(W, at, (m * u[0], m * u[1], m * u[2]))
     store3(W, at + 3, cross3(load3(W, rows.first_moment), u))
-    for i in range(1, len(tree.parent)):
-        store(W, at + 5 + i, dot3(load3(W, rows.moment_rate + 3 * i), u))
