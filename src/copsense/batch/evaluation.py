@@ -123,7 +123,7 @@ class BatchKernel:
             result, doubtful = single, list(range(len(self.names)))
         else:
             result = single.result
-            if not single.evaluate(row[None]):
+            if not single.evaluate(row):
                 return result
             doubtful = [int(j) for j in np.flatnonzero(single.doubtful)]
         self.stance.robot.check_configuration(row)
@@ -141,7 +141,9 @@ class BatchKernel:
             return empty
         from copsense.batch.single import Single
 
-        return Single(self._layout, self._choices, self._rows, empty, self.gains)
+        return Single(
+            self._layout, self._choices, self._rows, empty, nq=self._nq, gains=self.gains
+        )
 
     def _run(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         kernel, lanes = _kernel()

@@ -258,6 +258,39 @@ def put(typing: Any, W: Any, row: Any, lane: Any, number: Any) -> Any:
     return types.void(W, row, lane, number), generate
 
 
+def _array_at(kind: Any) -> Any:
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        address, size = (
+            context.cast(builder, value, given, types.intp)
+            for value, given in zip(args, sig.args, strict=True)
+        )
+        array = context.make_array(sig.return_type)(context, builder)
+        width = context.get_constant(types.intp, 8)
+        context.populate_array(
+            array,
+            data=builder.inttoptr(address, array.data.type),
+            shape=cgutils.pack_array(builder, [size]),
+            strides=cgutils.pack_array(builder, [width]),
+            itemsize=width,
+            meminfo=None,
+        )
+        return array._getvalue()
+
+    return lambda address, size: (types.Array(kind, 1, "C")(address, size), generate)
+
+
+@_primitive
+def floats_at(typing: Any, address: Any, size: Any) -> Any:
+    """The floats that lie at an address, whose owner has to outlive them: nobody counts."""
+    return _array_at(types.float64)(address, size)
+
+
+@_primitive
+def whole_at(typing: Any, address: Any, size: Any) -> Any:
+    """The whole numbers that lie at an address, likewise."""
+    return _array_at(types.int64)(address, size)
+
+
 def _element(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     pointer, _ = _pointer(context, builder, sig, args)
     number = ir.DoubleType().as_pointer()

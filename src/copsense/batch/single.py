@@ -1,7 +1,8 @@
 """Single: one posture at a time, for a controller's loop, without allocating anything.
 
 Handing many arrays from Python to compiled code takes longer than the statics. Everything that
-does not change is therefore packed into two arrays, and all results lie in a third.
+does not change is therefore packed into two arrays, all results lie in a third, and compiled code
+is told where they are.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from copsense.batch.choice import Choices
 from copsense.batch.kernel import Out, run
-from copsense.batch.lanes import as_tuple, compiled, workspace
+from copsense.batch.lanes import as_tuple, compiled, floats_at, whole_at, workspace
 from copsense.batch.layout import Feet, Layout, Tree
 from copsense.batch.result import BatchResult, array_names
 from copsense.batch.rows import Rows
@@ -30,10 +31,17 @@ class Single:
     """
 
     def __init__(
-        self, layout: Layout, choices: Choices, rows: Rows, empty: BatchResult, gains: bool
+        self,
+        layout: Layout,
+        choices: Choices,
+        rows: Rows,
+        empty: BatchResult,
+        *,
+        nq: int,
+        gains: bool,
     ) -> None:
         """Pack what does not change, and let the results share one array."""
-        self._ints, self._floats = pack(layout, choices, rows, gains, len(empty.criteria))
+        ints, floats = pack(layout, choices, rows, gains, len(empty.criteria))
         names, nk = array_names(), len(empty.criteria)
         arrays = [getattr(empty, name) for name in names]
         values = np.concatenate([*[a.ravel() for a in arrays], np.ones(nk)])
@@ -44,11 +52,14 @@ class Single:
         }
         self.result = replace(empty, **views)
         self.doubtful = values[ends[-1] :]
-        self._values, self._W = values, workspace(rows.size, width=1)
+        self._q = np.zeros(nq)
+        self._memory = (ints, floats, self._q, values, workspace(rows.size, width=1))
+        self._places = [number for a in self._memory for number in (a.ctypes.data, a.size)]
 
     def evaluate(self, q: np.ndarray) -> bool:
-        """Fill the result for a configuration (1, nq), contiguous; whether any is in doubt."""
-        return bool(run_single(self._ints, self._floats, q, self._values, self._W))
+        """Fill the result for a configuration (nq,); whether any criterion is in doubt."""
+        np.copyto(self._q, q)
+        return bool(run_single(*self._places))
 
 
 def pack(
@@ -82,11 +93,28 @@ def pack(
 
 
 @compiled
-def run_single(ints: Any, floats: Any, q: Any, values: Any, W: Any) -> bool:
-    """Unpack, and evaluate the one configuration q (1, nq) into `values`, as `Single` lays out.
+def run_single(
+    ints_at: int,
+    ints_size: int,
+    floats_from: int,
+    floats_size: int,
+    q_at: int,
+    q_size: int,
+    values_at: int,
+    values_size: int,
+    W_at: int,
+    W_size: int,
+) -> bool:
+    """Unpack, and evaluate one configuration into `values`, as `Single` lays out.
+
+    Arrays come as addresses and sizes: to hand over an array takes an allocation, and to count its
+    owners a quarter of the call.
 
     Returns whether a criterion is in doubt, which takes NumPy longer to tell.
     """
+    ints, floats = whole_at(ints_at, ints_size), floats_at(floats_from, floats_size)
+    q = floats_at(q_at, q_size).reshape(1, q_size)
+    values, W = floats_at(values_at, values_size), floats_at(W_at, W_size)
     b, nc, ns, ng, held, unknowns, nk, ne, gains = (
         ints[0],
         ints[1],
