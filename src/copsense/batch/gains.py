@@ -52,18 +52,20 @@ def com_motions(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
                 s = s + load(W, y + i) * load(W, at + i)
             for t in range(ns):
                 s = s + load(W, y + 6 + t) * load(W, at + 5 + feet.support[t])
-            for i in range(6):
-                store(W, at + i, load(W, at + i) - s * load(W, y + i))
-            for t in range(ns):
-                i = at + 5 + feet.support[t]
-                store(W, i, load(W, i) - s * load(W, y + 6 + t))
+            store(W, rows.along + c, s)
+        for i in range(m):
+            where = at + i if i < 6 else at + 5 + feet.support[i - 6]
+            s = load(W, where)
+            for c in range(r + 6):
+                s = s - load(W, rows.along + c) * load(W, rows.Y + m * c + i)
+            store(W, where, s)
         for i in range(nv):
             s = load(W, at + i)
             j = ancestor(tree, i)
             while j >= 0:
                 s = s - load(W, rows.H + nv * i + j) * load(W, at + j)
                 j = ancestor(tree, j)
-            store(W, at + i, s / load(W, rows.H + nv * i + i))
+            store(W, at + i, s * load(W, rows.diagonal + i))
     _normalise(tree, rows, W, nv)
 
 
@@ -78,7 +80,7 @@ def _constraint(feet: Feet, rows: Rows, W: Any, y: int, c: int, nv: int) -> None
         store(W, y + 6 + t, z)
     for t in range(ns - 1, -1, -1):
         own = rows.H + nv * (5 + feet.support[t])
-        x = load(W, y + 6 + t) / load(W, own + 5 + feet.support[t])
+        x = load(W, y + 6 + t) * load(W, rows.diagonal + 5 + feet.support[t])
         store(W, y + 6 + t, x)
         up = feet.anchor[feet.support[t]]
         while up >= 0:
@@ -89,7 +91,7 @@ def _constraint(feet: Feet, rows: Rows, W: Any, y: int, c: int, nv: int) -> None
             store(W, y + i, load(W, y + i) - load(W, own + i) * x)
     for i in range(5, -1, -1):
         own = rows.H + nv * i
-        x = load(W, y + i) / load(W, own + i)
+        x = load(W, y + i) * load(W, rows.diagonal + i)
         store(W, y + i, x)
         for j in range(i):
             store(W, y + j, load(W, y + j) - load(W, own + j) * x)

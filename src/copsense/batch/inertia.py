@@ -80,6 +80,7 @@ def factorise_inertia(tree: Tree, rows: Rows, W: Any) -> None:
         length = root(pivot)
         store(W, own + k, length)
         inverse = 1.0 / length
+        store(W, rows.diagonal + k, inverse)
         i = ancestor(tree, k)
         while i >= 0:
             store(W, own + i, load(W, own + i) * inverse)

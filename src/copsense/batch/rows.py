@@ -41,7 +41,7 @@ class Rows(NamedTuple):
         unknown: y or its adjoint (r,).
         six: a projection's coefficients (2, 6).
         felt: a gradient on the support joints (ns,).
-        along: a gradient's part along Q (r,).
+        along: a gradient's part along Q, or a motion's along Y (r + 6,).
         load: b, what the contacts' wrenches sum up to (6,).
         nothing: zeros (6,).
         wrench: phi of each contact (nc, 6).
@@ -60,7 +60,7 @@ class Rows(NamedTuple):
         gradient: of the CoPs (nc, 2, nv).
         inertia: of each body and what it carries, about o (n + 1, 6).
         H: M, then its factor L, by rows (nv, nv).
-        diagonal: of M (nv,).
+        diagonal: of M, then 1 / that of L (nv,).
         Y: L^-T J', then its orthonormal factor, by columns (r + 6, 6 + ns).
         RY: its triangular factor (r + 6, r + 6).
         motion: of unit CoM velocity along x and y (2, nv).
@@ -161,7 +161,7 @@ def rows(layout: Layout, nq: int) -> Rows:
         "unknown": r,
         "six": 12,
         "felt": ns,
-        "along": r,
+        "along": r + 6,
         "load": 6,
         "nothing": 6,
         "wrench": 6 * nc,
