@@ -8,25 +8,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.lanes import (
-    add3,
-    compiled,
-    cross3,
-    dot3,
-    load,
-    load3,
-    magnitude,
-    scale3,
-    sine_cosine,
-    splat,
-    store,
-    store3,
-    where_less,
-)
+from copsense.batch.lanes import compiled, load, magnitude, splat, store, where_less
 from copsense.batch.layout import CONTINUOUS, Feet, Tree
 from copsense.batch.planning import Plan, Search
 from copsense.batch.rows import Rows
 from copsense.batch.steps import OPPOSITE
+from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, sine_cosine, store3
 
 
 @compiled

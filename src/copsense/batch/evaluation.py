@@ -141,9 +141,7 @@ class BatchKernel:
             return empty
         from copsense.batch.single import Single
 
-        return Single(
-            self._layout, self._choices, self._rows, empty, nq=self._nq, gains=self.gains
-        )
+        return Single(self._layout, self._choices, self._rows, empty, nq=self._nq, gains=self.gains)
 
     def _run(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         kernel, lanes = _kernel()

@@ -14,19 +14,11 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.inertia import ancestor
-from copsense.batch.lanes import (
-    compiled,
-    cross3,
-    load,
-    load3,
-    root,
-    splat,
-    store,
-    where_less,
-)
+from copsense.batch.lanes import compiled, load, root, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.loops import factorise
 from copsense.batch.rows import Rows
+from copsense.batch.vectors import cross3, load3
 
 _STILL = 1e-12  # gains under which nothing moves, as in `CopSensitivity`
 _FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways

@@ -20,24 +20,13 @@ from typing import Any
 
 from copsense.batch.choice import WEIGHTED, Choices
 from copsense.batch.kinematics import screw_cross
-from copsense.batch.lanes import (
-    add3,
-    compiled,
-    cross3,
-    dot3,
-    load,
-    load3,
-    scale3,
-    splat,
-    store,
-    store3,
-    sub3,
-)
+from copsense.batch.lanes import compiled, load, splat, store
 from copsense.batch.layout import PRISMATIC, Feet, Tree
 from copsense.batch.loops import expand, gather_groups, times_lower, times_upper
 from copsense.batch.rows import Rows
 from copsense.batch.sharing import across_symmetric
 from copsense.batch.tangents import project, store_base
+from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, store3, sub3
 
 
 @compiled

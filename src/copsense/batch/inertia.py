@@ -9,22 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.lanes import (
-    Vector,
-    add3,
-    compiled,
-    cross3,
-    dot3,
-    load,
-    load3,
-    root,
-    splat,
-    store,
-    store3,
-    where_less,
-)
+from copsense.batch.lanes import compiled, load, root, splat, store, where_less
 from copsense.batch.layout import Tree
 from copsense.batch.rows import Rows
+from copsense.batch.vectors import Vector, add3, cross3, dot3, load3, store3
 
 _MASSLESS = 1e-10  # pivot, relative, of a motion that may move no mass: the clear path decides
 

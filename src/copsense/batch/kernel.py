@@ -11,19 +11,7 @@ from copsense.batch.gains import com_gains, com_motions, margins
 from copsense.batch.gradients import torque_gradients, wrench_gradients
 from copsense.batch.inertia import factorise_inertia
 from copsense.batch.kinematics import move, place_feet
-from copsense.batch.lanes import (
-    WIDTH,
-    along,
-    compiled,
-    get,
-    load,
-    load3,
-    put,
-    read_lanes,
-    store,
-    store3,
-    write_lanes,
-)
+from copsense.batch.lanes import WIDTH, compiled, get, load, put, read_lanes, store, write_lanes
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.loops import build
 from copsense.batch.rows import Rows
@@ -34,6 +22,7 @@ from copsense.batch.sharing import (
     set_load,
 )
 from copsense.batch.tangents import level_gradients, span
+from copsense.batch.vectors import along, load3, store3
 
 
 class Out(NamedTuple):

@@ -12,27 +12,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.lanes import (
+from copsense.batch.lanes import compiled, load, magnitude, root, splat, store, where_less
+from copsense.batch.layout import CONTINUOUS, PRISMATIC, Feet, Tree
+from copsense.batch.rows import Rows
+from copsense.batch.vectors import (
     LARGEST_ANGLE,
     Vector,
     add3,
-    compiled,
     cross3,
     dot3,
-    load,
     load3,
-    magnitude,
-    root,
     scale3,
     sine_cosine,
-    splat,
-    store,
     store3,
     sub3,
-    where_less,
 )
-from copsense.batch.layout import CONTINUOUS, PRISMATIC, Feet, Tree
-from copsense.batch.rows import Rows
 
 # Nearer than this to the limits of `Stance`'s checks, the clear path decides.
 _HEIGHT = 0.5e-6  # m

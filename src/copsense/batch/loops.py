@@ -15,25 +15,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.lanes import (
-    Vector,
-    add3,
-    any_less,
-    compiled,
-    cross3,
-    dot3,
-    load,
-    load3,
-    root,
-    scale3,
-    splat,
-    store,
-    store3,
-    sub3,
-    where_less,
-)
+from copsense.batch.lanes import any_less, compiled, load, root, splat, store, where_less
 from copsense.batch.layout import Feet
 from copsense.batch.rows import Rows
+from copsense.batch.vectors import Vector, add3, cross3, dot3, load3, scale3, store3, sub3
 
 _REPEAT = 1e-2  # a column that shrinks to less (squared) is made orthogonal once more
 _LOST = 1e-12  # less (squared): it may depend on the others, and the clear path decides

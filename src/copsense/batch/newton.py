@@ -19,18 +19,7 @@ import numpy as np
 
 from copsense.batch.constraints import errors, jacobian, spread
 from copsense.batch.kinematics import move, place_feet
-from copsense.batch.lanes import (
-    LARGEST_ANGLE,
-    compiled,
-    get,
-    load,
-    magnitude,
-    put,
-    root,
-    splat,
-    store,
-    where_less,
-)
+from copsense.batch.lanes import compiled, get, load, magnitude, put, root, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.planning import Plan, Search
 from copsense.batch.rows import Rows
@@ -50,6 +39,7 @@ from copsense.batch.steps import (
     TOLERANCE,
     UNSOLVED,
 )
+from copsense.batch.vectors import LARGEST_ANGLE
 
 
 class Found(NamedTuple):

@@ -18,33 +18,19 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.choice import WEIGHTED, Choices
-from copsense.batch.lanes import (
-    add3,
-    along,
-    compiled,
-    cross3,
-    dot3,
-    load,
-    load3,
-    magnitude,
-    scale3,
-    splat,
-    store,
-    store3,
-    sub3,
-    where_less,
-)
+from copsense.batch.lanes import compiled, load, magnitude, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.loops import (
     expand,
     factorise,
     gather_groups,
     invert_spread,
-    second_moment,
     invert_upper,
+    second_moment,
     times_upper,
 )
 from copsense.batch.rows import Rows
+from copsense.batch.vectors import add3, along, cross3, dot3, load3, scale3, store3, sub3
 
 _UNLOADED = 2e-9  # share of the weight; nearer to none, the clear path decides
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.lanes import compiled, cross3, dot3, load, load3, root, splat, store, store3
+from copsense.batch.lanes import compiled, load, root, splat, store
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.rows import Rows
+from copsense.batch.vectors import cross3, dot3, load3, store3
 
 
 @compiled
