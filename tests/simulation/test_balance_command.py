@@ -136,3 +136,42 @@ def test_without_an_off_screen_the_remedy_is_named(tmp_path, monkeypatch):
 )
 def test_bad_options_are_one_clear_line(options, says):
     assert says in copsense("balance", "solo12", *options).error
+
+
+def test_gains_from_the_command_can_be_too_much():
+    answer = copsense("balance", "icub", "--duration", 1, "--gain", "com-damping=-40", "--json")
+    assert answer.code == 1
+    end = answer.json["end"]
+    assert "diverged" in end["reason"]
+    assert 0.0 < end["time"] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--gain", "com-damp=1"], "no gain named 'com-damp'. Did you mean com-damping"),
+        (["--gain", "com-damping"], "Give NAME=VALUE, such as com-damping=14"),
+        (["--gain", "com-damping=nan"], "gain com_damping is not finite"),
+        (["--gain", "com-damping=1", "--controller", "a:b"], "belong to the built-in controller"),
+        (["--gains", "stiff", "--controller", "a:b"], "belong to the built-in controller"),
+        (["--control-period", 0.0015], "no multiple of the physics' time step"),
+        (["--control-period", 0], "control period"),
+        (["--payload", "chest"], "FRAME=KG"),
+        (["--torque-limit", "l_knee"], "JOINT=NM"),
+    ],
+)
+def test_gains_and_periods_that_are_none_are_refused(options, says):
+    answer = copsense("balance", "icub", "--duration", 0.1, *options)
+    assert answer.code == 2
+    assert says in " ".join(answer.err.split())
+    assert answer.out == ""
+
+
+def test_a_slower_controller_is_called_less_often(tmp_path):
+    for period in (0.001, 0.01):
+        data = tmp_path / f"{period}.nc"
+        answer = copsense(
+            "balance", "solo12", "--duration", 0.2, "--control-period", period, "--output", data
+        )
+        assert answer.code == 0, answer.err
+        assert load_recording(data).attrs["control_period"] == period

@@ -26,6 +26,27 @@ def run(scenario, criterion=C2, engine=None, gains=None):
     return rollout(engine or simulator(), controller, scenario)
 
 
+EACH = {
+    "push": {"pushes": (Push((5.0, 8.0, 0.0), 0.05, 0.05),)},
+    "motors": {"motors": Motors(delay=0.004, bandwidth=30.0, limit=20.0)},
+    "joint noise": {"noise": Noise(1e-4, 1e-3)},
+    "wrench noise": {"noise": Noise(force=1.0, moment=0.05)},
+    "friction": {"friction": (FrictionChange(0.05, 0.1),)},
+    "model error": {"model_error": ModelError(0.05, {"root_joint": 1.0})},
+    "odometry": {"odometry": "loaded", "noise": Noise(0.0, 1e-3)},
+}
+
+
+@pytest.mark.parametrize("kind", EACH)
+def test_every_disturbance_disturbs_and_is_the_same_twice(kind):
+    plain = {"duration": 0.2, "reference": Sine(0.01, 0.5), "seed": 4}
+    first, again = run(Scenario(**plain, **EACH[kind])), run(Scenario(**plain, **EACH[kind]))
+    assert first.equals(again)
+    assert not first.equals(run(Scenario(**plain)))
+    if "noise" in EACH[kind]:
+        assert not first.equals(run(Scenario(**{**plain, "seed": 5}, **EACH[kind])))
+
+
 def test_sensors_over_the_feet_read_the_contacts_wrenches_at_rest():
     for stance in (icub(), copsense.load_stance("solo12")):
         criterion = copsense.minimum_torque(tie_break=C1)

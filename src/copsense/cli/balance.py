@@ -6,11 +6,12 @@ import math
 import shlex
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from tqdm import tqdm
 
+from copsense.cli.controller import controller_options, read_controller
 from copsense.cli.disturbances import (
     REFERENCES,
     disturbance_options,
@@ -27,16 +28,12 @@ from copsense.cli.options import (
 )
 from copsense.errors import InvalidInputError
 
-if TYPE_CHECKING:
-    from copsense.controllers import Controller
-    from copsense.criterion import Criterion
-    from copsense.limits import Limits
-    from copsense.stance import Stance
-
 
 @click.command(
-    epilog="Example: copsense balance icub --criterion minimum-torque --reference sine:0.03:0.1 "
-    "--duration 10 --output icub.nc --plot icub.png"
+    epilog="\b\nExamples:\n"
+    "  copsense balance icub --reference sine:0.03:0.1 --output icub.nc --plot icub.png\n"
+    "  copsense balance icub --push 0:40:0:0.5:0.1 --gain com-stiffness=100 --gain com-damping=20\n"
+    "  copsense balance icub --controller my_balance:Balance --video icub.mp4"
 )
 @stance_options
 @criterion_options
@@ -51,18 +48,14 @@ if TYPE_CHECKING:
 @click.option(
     "--duration", type=float, metavar="S", help="Default: one period, the ramp and 1 s, or 2 s."
 )
+@controller_options
 @click.option(
-    "--gains",
-    type=click.Choice(["stiff", "public"]),
-    default="stiff",
+    "--control-period",
+    type=float,
+    default=1e-3,
     show_default=True,
-    help="Gains: stiff, or soft ones like those the authors published.",
-)
-@click.option(
-    "--controller",
-    metavar="MODULE:NAME",
-    help="Your controller instead: a class made of the stance, or a function observation -> "
-    "torques. A --criterion is then for the static prediction.",
+    metavar="S",
+    help="Time between two steps of the controller [s], a multiple of the physics' 1 ms.",
 )
 @click.option(
     "--wrenches",
@@ -91,7 +84,9 @@ def balance(
     reference: str,
     duration: float | None,
     gains: str,
+    gain: tuple[str, ...],
     controller: str | None,
+    control_period: float,
     wrenches: Any,
     until: Any,
     output: str | None,
@@ -131,16 +126,18 @@ def balance(
     scenario = Scenario(
         natural if duration is None else duration,
         signal,
+        control_period=control_period,
         name=reference,
         **read_disturbances(options),
     )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
     scenario.check_stance(stance)
     simulator = MujocoSimulator(stance, wrenches=wrenches)
-    law = _controller(stance, controller, criterion, gains, allowed)
+    scenario.steps_per_control(simulator.time_step)
+    law = read_controller(stance, controller, criterion, gains, gain, allowed)
     path = lateral_reference(stance, signal)
     total = round(scenario.duration / scenario.control_period)
-    with tqdm(total=total, desc="balancing", unit="ms", disable=None, leave=False) as bar:
+    with tqdm(total=total, desc="balancing", unit="step", disable=None, leave=False) as bar:
         recording = rollout(
             simulator,
             law,
@@ -168,17 +165,6 @@ def balance(
     else:
         _print(summary, [path for path in (output, picture, video) if path])
     click.get_current_context().exit(0 if summary["end"]["kind"] == "completed" else 1)
-
-
-def _controller(
-    stance: Stance, own: str | None, criterion: Criterion, gains: str, limits: Limits | None
-) -> Controller:
-    from copsense.controllers import STIFF, BalancingController, load_controller, public_gains
-
-    if own is not None:
-        return load_controller(own, stance)
-    chosen = STIFF if gains == "stiff" else public_gains(stance.robot)
-    return BalancingController(stance, criterion, chosen, limits=limits)
 
 
 def _summary(recording: Any) -> dict[str, Any]:

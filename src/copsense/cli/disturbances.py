@@ -94,7 +94,10 @@ def read_disturbances(options: dict[str, Any]) -> dict[str, Any]:
     return {
         "pushes": tuple(_read_push(text) for text in take("push")),
         "friction": tuple(_read_friction(text) for text in take("friction")),
-        "model_error": ModelError(take("mass_error") / 100.0, read_assignments(take("payload"))),
+        "model_error": ModelError(
+            take("mass_error") / 100.0,
+            read_assignments(take("payload"), "FRAME=KG, such as chest=1"),
+        ),
         "motors": Motors(
             take("delay"), take("bandwidth"), _read_torque_limits(take("torque_limit"))
         ),
@@ -176,4 +179,4 @@ def _read_torque_limits(texts: tuple[str, ...]) -> Any:
             raise InvalidInputError(
                 f"the torque limit {texts[0]!r} is not understood. Give Nm, model or JOINT=NM."
             ) from None
-    return read_assignments(texts) or None
+    return read_assignments(texts, "NM, model or JOINT=NM, such as l_knee=20") or None

@@ -206,8 +206,10 @@ def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]
     return (x0, x1), (y0, y1)
 
 
-def read_assignments(texts: tuple[str, ...]) -> dict[str, float]:
-    """``NAME=NUMBER`` options as a dictionary."""
+def read_assignments(
+    texts: tuple[str, ...], form: str = "JOINT=DEGREES, such as l_knee=-20"
+) -> dict[str, float]:
+    """``NAME=NUMBER`` options as a dictionary; `form` tells whoever got one wrong how to write."""
     values = {}
     for text in texts:
         name, equals, number = text.partition("=")
@@ -216,9 +218,7 @@ def read_assignments(texts: tuple[str, ...]) -> dict[str, float]:
         except ValueError:
             equals = ""
         if not (name and equals):
-            raise InvalidInputError(
-                f"{text!r} is not understood. Give JOINT=DEGREES, such as l_knee=-20."
-            )
+            raise InvalidInputError(f"{text!r} is not understood. Give {form}.")
     return values
 
 
