@@ -10,11 +10,11 @@ import numpy as np
 import scipy.optimize
 from jaxtyping import Float
 
-from copsense.arrays import finite_number
 from copsense.criterion import Criterion
 from copsense.equilibrium import ConstrainedEquilibrium, distance_to_change
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits
+from copsense.margins import check_search
 from copsense.motion import lateral_posture
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
@@ -80,9 +80,7 @@ def next_change(
         InvalidInputError: a direction other than +1 or -1, or no limit to meet.
         InfeasibleError: no wrench respects the limits where the path begins.
     """
-    if direction not in (1, -1):
-        raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    reach = finite_number(reach, "the reach [m]", positive=True)
+    check_search(direction, reach, samples)
     y0 = float(stance.com[1])
     start, tangent = lateral_posture(stance, y0)
     begin = cop_sensitivity(start, criterion, limits)

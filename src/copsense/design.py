@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import scipy.optimize
 from jaxtyping import Float
+from scipy.interpolate import CubicHermiteSpline
 
 from copsense.criterion import (
     Criterion,
@@ -27,6 +28,7 @@ from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 
 Objective = Literal["travel", "gain"]
+NO_LIMIT = "none within the path"  # a score's first limit where the path ends before any
 _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
 _BAD = 1e3  # objective of a criterion that fails on the path
@@ -196,7 +198,8 @@ def score(
 ) -> Score:
     """How a criterion does along a path.
 
-    The travel is interpolated between the path's postures.
+    Between the path's postures the limits' slacks are cubics through their values and derivatives:
+    the travel errs with the fourth power of the postures' distance.
 
     Args:
         path: postures to either side of its middle one.
@@ -210,19 +213,22 @@ def score(
     """
     middle = len(path) // 2
     table = margin_table(path.stances[middle], limits)
-    rows, gains, norms = [], [], []
-    for stance in path.stances:
+    rows, rates, gains, norms = [], [], [], []
+    for stance, tangent in zip(path.stances, path.tangents, strict=True):
         result = cop_sensitivity(stance, criterion)
+        equilibrium = result.equilibrium
         # Slacks are nearer to straight lines than distances, whose f_z falls towards a limit.
-        rows.append(table.slack(result.equilibrium.forces, result.equilibrium.torques))
+        rows.append(table.slack(equilibrium.forces, equilibrium.torques))
+        df, dtau = (d[:, 0] for d in equilibrium.derivative(tangent[:, None]))
+        rates.append(table.slack(df, dtau) - table.slack(0.0 * df, 0.0 * dtau))
         gains.append(max(np.linalg.norm(gain, 2) for gain in result.com_gain))
-        norms.append(float(np.sum(result.equilibrium.torques**2)))
-    values, along = np.array(rows), path.values - path.values[middle]
-    ends = [_first_zero(values, along, middle, side) for side in (1, -1)]
+        norms.append(float(np.sum(equilibrium.torques**2)))
+    along = path.values - path.values[middle]
+    ends = [_first_zero(np.array(rows), np.array(rates), along, middle, side) for side in (1, -1)]
     travel, row = min(ends)
     reach = travel if within is None else within
     taken = np.abs(along) <= reach + _ROUNDING  # a posture at the very end counts on either side
-    reached = table.names[row] if row >= 0 else "none within the path"
+    reached = table.names[row] if row >= 0 else NO_LIMIT
     return Score(
         criterion.name,
         dict(parameters),
@@ -289,19 +295,26 @@ def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
 
 
 def _first_zero(
-    values: Float[np.ndarray, "N r"], along: Float[np.ndarray, " N"], middle: int, side: int
+    values: Float[np.ndarray, "N r"],
+    rates: Float[np.ndarray, "N r"],
+    along: Float[np.ndarray, " N"],
+    middle: int,
+    side: int,
 ) -> tuple[float, int]:
-    """Travel at which a slack first reaches zero on one side, interpolated, and its row."""
-    order = range(middle, len(along)) if side > 0 else range(middle, -1, -1)
-    indices = list(order)
+    """Travel at which a slack first reaches zero on one side, and its row; -1 if none does."""
     if np.any(values[middle] < 0):
         return 0.0, int(np.argmin(values[middle]))
+    indices = list(range(middle, len(along)) if side > 0 else range(middle, -1, -1))
     for i, j in pairwise(indices):
         crossed = np.flatnonzero((values[i] >= 0) & (values[j] < 0))
-        if len(crossed):
-            share = values[i, crossed] / (values[i, crossed] - values[j, crossed])
-            first = int(np.argmin(share))
-            return float(abs(along[i] + share[first] * (along[j] - along[i]))), int(crossed[first])
+        roots = []
+        for row in crossed:
+            ends = sorted((i, j))
+            slack = CubicHermiteSpline(along[ends], values[ends, row], rates[ends, row])
+            roots.append(float(scipy.optimize.brentq(slack, along[i], along[j], xtol=_ROUNDING)))
+        if roots:
+            first = int(np.argmin(np.abs(roots)))
+            return abs(roots[first]), int(crossed[first])
     return float(abs(along[indices[-1]])), -1
 
 

@@ -152,8 +152,8 @@ class InfeasibleError(CopsenseError):
         self.violation, self.demands = violation, demands
         super().__init__(
             f"no wrench balances the robot within the limits: each would have to give way by "
-            f"{violation:.3g} N or Nm. In conflict: {'; '.join(demands) or 'unknown'}. Relax "
-            "one of these limits, or move the posture."
+            f"{violation:.3g} N, or as many Nm where it limits a moment. In conflict: "
+            f"{'; '.join(demands) or 'unknown'}. Relax one of these limits, or move the posture."
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.optimize
 from jaxtyping import Float
 
+from copsense.arrays import finite_number
 from copsense.contact import Contact
 from copsense.criterion import Criterion
 from copsense.equilibrium import StaticEquilibrium, solve_equilibrium
@@ -113,10 +114,9 @@ def limit_travel(
         samples: postures looked at before the crossings are refined.
 
     Raises:
-        InvalidInputError: a direction other than +1 or -1.
+        InvalidInputError: a direction other than +1 or -1, or nothing to look at.
     """
-    if direction not in (1, -1):
-        raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
+    check_search(direction, reach, samples)
     table = margin_table(stance, limits)
     y0 = float(stance.com[1])
 
@@ -147,6 +147,19 @@ def limit_travel(
         found.append(LimitTravel(table.margin(rows, values), table.names[row], first, exact))
     found.sort(key=lambda f: (np.inf if f.exact is None else f.exact, f.first_order))
     return Travel(direction, tuple(found), walked[-1][0])
+
+
+def check_search(direction: int, reach: float, samples: int) -> None:
+    """Refuse a search along the lateral path that has no side, no length or no posture.
+
+    Raises:
+        InvalidInputError: says which, and what would do.
+    """
+    if direction not in (1, -1):
+        raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
+    finite_number(reach, "the reach [m]", positive=True)
+    if samples < 1:
+        raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
 
 
 def _first_crossing(

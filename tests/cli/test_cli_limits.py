@@ -113,6 +113,7 @@ def test_infeasible_limits_are_rows_with_the_limits_in_conflict():
         ("cop-margin=-1", "non-negative"),
         ("cop-margin=1", "sole"),
         ("sides=2", "3 or more"),
+        ("off", "Leave --limits out"),
         ("sides=off", "no number"),
         ("friction=0.3,friction=0.4", "given twice"),
         ("torsion=cone,friction=off", "wrench cone"),
@@ -151,3 +152,29 @@ def test_a_design_without_travel_says_so():
 def test_two_pictures_need_two_files(tmp_path):
     same = ("--plot", tmp_path / "a.png", "--regions", tmp_path / "a.png")
     assert "Give each its own" in copsense("analyse", "icub", "--limits", LIMITS, *same).error
+
+
+def test_clipped_wrenches_have_no_travel_of_their_own():
+    text = copsense("analyse", "icub", "--com-y", "0.041", "--limits", "friction=0").out
+    wrench, _ = text.split("minimum-torque: torque norm")
+    assert "clipped  clipped" in wrench
+    assert "as the limits clip them" in wrench
+    # Without any tangential force every side of both pyramids is touched: told in two words.
+    assert "l_sole: slips 8 ways (touched); r_sole: slips 8 ways (touched)" in wrench
+    free = copsense("analyse", "icub", "--limits", "friction=0.33").out
+    assert "clipped" not in free
+    assert "to first order; along y, see below" in free
+
+
+def test_a_design_that_gains_nothing_or_meets_no_limit_says_so():
+    answer = copsense("design", "icub", "--family", "length", "--grid", 2, "--com-y=-0.01:0.01:5")
+    assert answer.code == 0
+    assert "keep minimum-wrench" in answer.out
+    assert "Sweep farther" in answer.err
+
+
+def test_regions_without_end_are_said_to_be_so(tmp_path):
+    picture = tmp_path / "regions.svg"
+    answer = copsense("analyse", "four_bar", "--limits", "friction=0.5", "--regions", picture)
+    assert answer.code == 0
+    assert "without end" in answer.out

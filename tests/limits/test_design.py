@@ -231,3 +231,17 @@ def test_travel_where_a_limit_is_broken_from_the_start(icub_path, icub):
     found = score(icub_path, Limits(normal_force=0.6 * icub.robot.weight), TORQUE, {})
     assert found.travel == 0.0
     assert "normal force" in found.first_limit
+
+
+@pytest.mark.parametrize("count", [5, 9])
+def test_a_coarse_path_has_the_exact_travel(icub, count):
+    path = copsense.lateral_sweep(icub, -0.06, 0.06, count)
+    for criterion in (TORQUE, WRENCH):
+        exact = min(
+            t.exact
+            for side in (1, -1)
+            for t in limit_travel(icub, criterion, COP_ONLY, side).limits
+            if t.exact is not None
+        )
+        found = score(path, COP_ONLY, criterion, {})
+        assert found.travel == pytest.approx(exact, abs=1e-6)

@@ -226,3 +226,13 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
                 assert np.abs(at).min() < 1e-6
                 named += found.name != found.margin.name
     assert named  # the nearest at the start is not always the one that is met
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [({"reach": np.nan}, "reach"), ({"reach": 0.0}, "reach"), ({"samples": 0}, "1 sample or more")],
+)
+def test_a_search_of_nothing_is_refused(icub, options, says):
+    for search in (limit_travel, copsense.next_change):
+        with pytest.raises(InvalidInputError, match=says):
+            search(icub, copsense.minimum_torque(), Limits(), **options)

@@ -12,6 +12,7 @@ from copsense.cli.limits import (
     add_limits,
     add_regions,
     limit_verdict,
+    presses,
     print_limits,
     print_regions,
 )
@@ -198,12 +199,17 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
         head = f"  {'contact':{width}}   load  CoP x, y [mm]     margin [mm]          "
         head += "dCoP_y/dCoM_y  worst gain  CoM travel [mm]: tips  unloads"
         click.echo(head + (f"  dCoP_y/d{along} [mm/deg]" if along else ""))
+        clipped = presses(row)
         for contact, c in row["contacts"].items():
             margin = "-"
             if "margin" in c:
                 margin = f"{c['margin'] * 1e3:6.1f} to {c['margin_side']}"
             tips, unloads = (
-                f"{c[key] * 1e3:.1f}" if math.isfinite(c[key]) else "never"
+                "clipped"
+                if clipped
+                else f"{c[key] * 1e3:.1f}"
+                if math.isfinite(c[key])
+                else "never"
                 for key in ("com_travel", "unloading_travel")
             )
             x, y = (round(value * 1e3, 2) + 0.0 for value in c["cop"])
@@ -216,6 +222,12 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
                 line += f"  {c[f'cop_per_{along}'][1] * 1e3 * math.pi / 180:12.3f}"
             click.echo(line + ("  PULLING" if c["pulling"] else ""))
         if "limit_travel" in row:
+            click.echo(
+                "  slopes and gains: of the wrenches as the limits clip them; how far the CoM may "
+                "go stands below"
+                if clipped
+                else "  tips, unloads: in the worst direction, to first order; along y, see below"
+            )
             print_limits(row)
     click.echo("\n" + _verdict(answer))
     for note in answer["notes"]:

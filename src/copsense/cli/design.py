@@ -20,6 +20,8 @@ from copsense.errors import UnknownNameError
 if TYPE_CHECKING:
     from copsense.design import Design, Score
 
+_SAME = 1e-6  # relative: less is no gain
+
 
 @click.command(
     epilog="Example: copsense design icub --family joints --limits friction=0.33,torque=model "
@@ -117,24 +119,49 @@ def design(
 
 
 def _print(robot: str, found: Design) -> None:
+    from copsense.design import NO_LIMIT
+
     click.echo(f"{robot}: family {found.family}, objective {found.objective}")
     click.echo("criterion         travel [mm]  worst gain  torque norm [N m]  first limit")
     for row in (*found.baselines, found.score):
         click.echo(_line(row))
     chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
-    own, known = found.score.travel, max(s.travel for s in found.baselines)
-    more = (
-        f"{(own / known - 1) * 100:+.0f} % over the better of the paper's two"
-        if known > 0
-        else f"{own * 1e3:.1f} mm, where the paper's two are beyond a limit in the middle already"
-    )
+    click.echo(f"\nbest: {chosen}; {_gained(found)}")
     reach = found.score.range * 1e3
-    click.echo(f"\nbest: {chosen}; travel {more}")
-    click.echo(f"gain and torque norm over postures within {reach:.1f} mm of the middle")
+    click.echo(
+        "worst gain: the largest |dCoP/dCoM| of any contact; it and the torque norm (rms) are over "
+        f"the postures within {reach:.1f} mm of the middle"
+    )
+    if NO_LIMIT in (found.score.first_limit, *(s.first_limit for s in found.baselines)):
+        click.echo(
+            "note: the path ends before a limit is met, so that travels of its length are not told "
+            "apart. Sweep farther: --com-y START:STOP:COUNT.",
+            err=True,
+        )
     click.echo("\nPareto set (no other is better in both):")
     for row in found.pareto:
         chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
         click.echo(_line(row) + f"  {chosen}")
+
+
+def _gained(found: Design) -> str:
+    """What the designed criterion is worth beside the better of the paper's two."""
+    if found.objective == "gain":
+        best = min(found.baselines, key=lambda s: s.worst_gain)
+        change = found.score.worst_gain / best.worst_gain - 1 if best.worst_gain > 0 else 0.0
+        better, what = change < -_SAME, "worst gain"
+    else:
+        best = max(found.baselines, key=lambda s: s.travel)
+        if best.travel == 0:
+            own = found.score.travel * 1e3
+            return f"{own:.1f} mm, where the paper's two are beyond a limit in the middle already"
+        change = found.score.travel / best.travel - 1 if best.travel > 0 else 0.0
+        better, what = change > _SAME, "travel"
+    if not better:
+        return (
+            f"no better than {best.criterion} ({what} {change * 100:+.1f} %): keep {best.criterion}"
+        )
+    return f"{what} {change * 100:+.0f} % over the better of the paper's two"
 
 
 def _line(row: Score) -> str:

@@ -118,11 +118,7 @@ def print_limits(row: dict[str, Any]) -> None:
     To the next change of them the wrenches are those within the limits; to each limit they are the
     criterion's own.
     """
-    names = "; ".join(
-        limit["name"] + ("" if limit["multiplier"] else " (touched)")
-        for limit in row["active_limits"]
-    )
-    click.echo(f"  active limits: {names or 'none'}")
+    click.echo(f"  active limits: {'; '.join(_named(row['active_limits'])) or 'none'}")
     for side, change in row["next_change"].items():
         first, exact = change["first_order"], change["exact"]
         if row["active_limits"] and exact is not None:
@@ -144,6 +140,24 @@ def print_limits(row: dict[str, Any]) -> None:
                 f"  CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} "
                 f"({predicted})"
             )
+
+
+def presses(row: dict[str, Any]) -> bool:
+    """Whether a limit clips the wrenches of a criterion."""
+    return any(limit["multiplier"] for limit in row.get("active_limits", ()))
+
+
+def _named(active: list[dict[str, Any]]) -> list[str]:
+    """Names of active limits; the sides of a pyramid that are merely touched stand together."""
+    names = [limit["name"] for limit in active if limit["multiplier"]]
+    touched: dict[str, list[str]] = {}
+    for limit in active:
+        if not limit["multiplier"]:
+            touched.setdefault(limit["name"].partition(" towards ")[0], []).append(limit["name"])
+    for common, each in touched.items():
+        name = each[0] if len(each) == 1 else f"{common} {len(each)} ways"
+        names.append(f"{name} (touched)")
+    return names
 
 
 def add_regions(

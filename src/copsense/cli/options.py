@@ -250,6 +250,11 @@ def read_limits(text: str | None) -> Limits | None:
     values: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
         name, _, value = part.partition("=")
+        if name in ("off", "none"):
+            raise InvalidInputError(
+                f"--limits {name} is no limit. Leave --limits out for none at all, or switch one "
+                "off by name, such as friction=off."
+            )
         if name not in names:
             raise UnknownNameError("limit", name, names)
         if names[name] in values:

@@ -91,8 +91,9 @@ def plot_regions(
     grey = iter(("#9aa4ae", INK, MUTED))
     shown: dict[str, str] = {}
     corners = [np.zeros((0, 2))]
-    for name, region in regions.items():
-        shown[name] = colour.get(name) or next(grey)
+    for number, (name, region) in enumerate(regions.items()):
+        shade = colour.get(name) or next(grey)
+        shown[name if region.bounded else f"{name} (without end)"] = shade
         outline = region.polygon * MM
         corners.append(outline)
         if len(outline) >= _DEGENERATE:
@@ -100,13 +101,15 @@ def plot_regions(
                 Polygon(
                     outline[:, ::-1],
                     facecolor="none",
-                    edgecolor=shown[name],
+                    edgecolor=shade,
                     linewidth=1.8,
                     zorder=3,
                 )
             )
         else:
-            ax.plot(outline[:, 1], outline[:, 0], color=shown[name], linewidth=1.8, zorder=3)
+            # Segments lie on one another: the later ones are thinner, so that none hides.
+            width = max(9.0 - 2.5 * number, 1.8)
+            ax.plot(outline[:, 1], outline[:, 0], color=shade, linewidth=width, zorder=3)
     way = dataset["com"].values[:, :2] * MM
     ax.plot(way[:, 1], way[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
     if com is not None:

@@ -12,7 +12,12 @@ from matplotlib.lines import Line2D
 
 from copsense.plots.cops import plot_cop
 from copsense.plots.curves import plot_load, plot_travel
-from copsense.plots.limits import limit_kinds, mark_first_limits, plot_limit_margins
+from copsense.plots.limits import (
+    first_limits,
+    limit_kinds,
+    mark_first_limits,
+    plot_limit_margins,
+)
 from copsense.plots.reading import (
     MM,
     abscissa,
@@ -119,7 +124,7 @@ def _handles(dataset: xr.Dataset) -> list[Line2D]:
         for name, style in line_styles(contacts).items()
     ]
     handles.append(Line2D([], [], label="CoM", **COM_LINE))
-    if "limit_margin" in dataset and limit_kinds(dataset):
+    if "limit_margin" in dataset and any(first_limits(dataset, j) for j in range(len(names))):
         handles.append(Line2D([], [], label="first limit met", color=MUTED, **LIMIT_LINE))
     if not np.all(planted(dataset) | failed(dataset)[..., None]):
         handles.append(Line2D([], [], color=MUTED, label="CoP off its sole", **OFF_SOLE))
