@@ -93,15 +93,3 @@ def test_what_is_not_understood_is_one_line(arguments, word, tmp_path, monkeypat
     answer = run("map", "icub", *arguments, "--output", "m.zarr")
     assert word in answer.error
     assert not list(tmp_path.iterdir())
-
-
-def test_out_of_reach_for_want_of_a_height_is_told_with_the_remedy(tmp_path):
-    far = ("map", "icub", "--over", "com_x=-0.04:0.04:3", "--over", "com_y=-0.04:0.04:3")
-    answer = run(*far, "--output", tmp_path / "a.zarr")
-    assert answer.code == 1
-    assert "No height is named" in answer.err
-    remedy = answer.err.split("0.546 m): ")[1].split()[:2]
-    assert remedy[0] == "--over"
-    lower = run(*far, remedy[0], remedy[1].rstrip("."), "--output", tmp_path / "b.zarr")
-    assert "No height" not in lower.err
-    assert lower.out.count("unreachable") < answer.out.count("unreachable")

@@ -157,7 +157,6 @@ def map_command(
         echo_json(_as_json(summary, plot))
     else:
         _print(summary, plot)
-    _hint(summary, float(stance.com[2]))
     click.get_current_context().exit(1 if _failures(summary) else 0)
 
 
@@ -213,21 +212,6 @@ def _draw(
 def _failures(summary: MapSummary) -> int:
     kinds = ("unreachable", "refused", "unsolved")
     return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
-
-
-def _hint(summary: MapSummary, height: float) -> None:
-    """What to do where legs are too short for a body that keeps its height."""
-    lost = max(row.counts["unreachable"] for row in summary.criteria.values())
-    moved = {"com_x", "com_y", "base_x", "base_y"} & set(summary.coordinates)
-    if not lost or not moved or {"com_z", "base_z"} & set(summary.coordinates):
-        return
-    lower = f"{height - 0.03:.2f}"
-    click.echo(
-        f"note: {lost} postures are out of the legs' reach. No height is named, so the base keeps "
-        f"its own, and nearly straight legs reach no farther. Name the CoM's (it stands at "
-        f"{height:.3f} m): --over com_z={lower}:{lower}:1.",
-        err=True,
-    )
 
 
 def _as_json(summary: MapSummary, plot: str | None) -> dict[str, Any]:
