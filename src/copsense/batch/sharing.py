@@ -40,8 +40,8 @@ from copsense.batch.loops import (
     factorise,
     gather_groups,
     invert_spread,
-    second_moment,
     invert_upper,
+    second_moment,
     times_upper,
 )
 from copsense.batch.rows import Rows
