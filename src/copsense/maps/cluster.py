@@ -27,6 +27,8 @@ from copsense.maps.store import MapStore, open_map
 
 _TIMEOUT = 5.0  # s for a scheduler to answer
 _PATIENCE = 60.0  # s for the first worker to join
+# A terminal's Ctrl-C goes to the workers too, which would only be loud about it.
+_DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 _AHEAD = 4  # chunks that are sent out for each thread of the workers
 
 
@@ -37,7 +39,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     Raises:
         InvalidInputError: both are given, or no worker.
         MissingExtraError: Dask Distributed is not installed.
-        SchedulerError: nothing answers at the address.
+        SchedulerError: nothing answers at the address, or no worker joins.
     """
     if scheduler is not None and workers is not None:
         raise InvalidInputError(
@@ -54,7 +56,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             with ThreadPoolExecutor(1) as thread:
                 thread.submit(asyncio.run, _answer(scheduler)).result()
             client = distributed.Client(scheduler, timeout=_TIMEOUT)
-        except (OSError, ValueError, TimeoutError) as error:
+        except Exception as error:  # whatever an address makes of itself
             late = f"no answer within {_TIMEOUT:g} s"
             raise SchedulerError(
                 f"no Dask scheduler answers at {scheduler} ({str(error) or late}). Start one "
@@ -62,6 +64,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                 "tcp://127.0.0.1:8786."
             ) from None
         with client:
+            _await_worker(client)
             yield client
         return
     number = whole_number(workers, "the number of local workers")
@@ -73,10 +76,22 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             host="127.0.0.1",
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
+            preload=_DEAF,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield client
+
+
+def _await_worker(client: Any) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except TimeoutError:
+        where = client.scheduler.address
+        raise SchedulerError(
+            f"no worker has joined {where} within {_PATIENCE:g} s. Start some with "
+            f"`dask worker {where} --nthreads 1`, and run the same again."
+        ) from None
 
 
 def _silence() -> None:
@@ -106,21 +121,12 @@ def evaluate_there(
     """Have the workers evaluate these chunks and write them into the store.
 
     Raises:
-        SchedulerError: no worker joins, one cannot take part or does not see the store, workers
-            died over the same chunk, or the scheduler is gone.
+        SchedulerError: a worker cannot take part or does not see the store, workers died over the
+            same chunk, or the scheduler is gone.
         OutputError: a worker cannot write the store.
     """
     import distributed
 
-    if not pending:
-        return
-    try:
-        client.wait_for_workers(1, timeout=_PATIENCE)
-    except TimeoutError:
-        raise SchedulerError(
-            f"no worker has joined {client.scheduler.address} within {_PATIENCE:g} s. Start some "
-            f"with `dask worker {client.scheduler.address} --nthreads 1`, and run the same again."
-        ) from None
     run, remaining = uuid.uuid4().hex, iter(pending)
     # A task of its own: were the worker that holds it to die, another would make it again.
     package = client.submit(

@@ -133,6 +133,12 @@ def _unequal(where: str, stored: Any, asked: Any) -> str:
 
 
 def _short(value: Any) -> str:
+    if (
+        isinstance(value, list)
+        and value
+        and all(isinstance(v, dict) and "name" in v for v in value)
+    ):
+        value = [v["name"] for v in value]
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
