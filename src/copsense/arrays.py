@@ -58,3 +58,19 @@ def finite_number(value: object, what: str, *, positive: bool = False) -> float:
     if not math.isfinite(number) or (positive and number <= 0):
         raise InvalidInputError(f"{what} is {value!r}. Give {need}.")
     return number
+
+
+def whole_number(value: object, what: str, *, least: int = 1) -> int:
+    """One whole number, not below `least`.
+
+    Raises:
+        InvalidInputError: it is none.
+    """
+    try:
+        number = int(value)  # type: ignore[call-overload]
+        fits = bool(number == value) and number >= least
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
+        raise InvalidInputError(f"{what} is {value!r}. Give a whole number from {least}.")
+    return int(number)

@@ -14,6 +14,7 @@ from dataclasses import fields
 import numpy as np
 from numpy.typing import ArrayLike
 
+from copsense.arrays import whole_number
 from copsense.batch.coordinates import checked_values, joint_units, row_units
 from copsense.batch.coordinates import coordinates as named
 from copsense.batch.layout import layout, not_covered
@@ -82,7 +83,7 @@ class PostureChart:
 
     def empty(self, count: int) -> PostureBatch:
         """Arrays for `count` postures, to be filled with ``out=``."""
-        return empty_postures(self.stance, count)
+        return empty_postures(self.stance, whole_number(count, "the number of postures", least=0))
 
     def solve(
         self, values: ArrayLike, out: PostureBatch | None = None, threads: int = 1
@@ -102,14 +103,13 @@ class PostureChart:
             InvalidInputError: values of the wrong shape or not finite; `out` of another size.
         """
         x = checked_values(values, self.names)
-        if int(threads) != threads or threads < 1:
-            raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
+        threads = whole_number(threads, "threads")
         batch = self.empty(len(x)) if out is None else self._fitting(out, len(x))
         batch.reasons[:] = ""
         status = np.full(len(x), ELSEWHERE, dtype=np.int64)
         which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
         if not self.why_clear and len(x):
-            self._run(x, batch, status, which, excess, int(threads))
+            self._run(x, batch, status, which, excess, threads)
         for row in np.flatnonzero(status == ELSEWHERE):
             found = search_one(self.stance, self._plan, x[row])
             batch.configurations[row], batch.residuals[row] = found.q, found.residual
@@ -173,14 +173,20 @@ class PostureChart:
         return f"{how}: {label} remains {residual:.2e} {unit} off"
 
     def _fitting(self, out: PostureBatch, count: int) -> PostureBatch:
+        if not isinstance(out, PostureBatch):
+            raise InvalidInputError(
+                f"out is of type {type(out).__name__}. Make it with PostureChart.empty({count})."
+            )
         wanted = self.empty(0)
         for field in fields(PostureBatch):
             array = getattr(out, field.name)
-            shape = (count, *getattr(wanted, field.name).shape[1:])
-            if array.shape != shape or not array.flags.c_contiguous or not array.flags.writeable:
+            like = getattr(wanted, field.name)
+            shape = (count, *like.shape[1:])
+            fits = array.shape == shape and array.dtype == like.dtype
+            if not (fits and array.flags.carray):
                 raise InvalidInputError(
-                    f"out.{field.name} has shape {array.shape}, or is not contiguous and "
-                    f"writeable; the chart needs {shape}. Make it with "
+                    f"out.{field.name} is {array.dtype} of shape {array.shape}, or not contiguous "
+                    f"and writeable; the chart needs {like.dtype} of shape {shape}. Make it with "
                     f"PostureChart.empty({count})."
                 )
         return out

@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array
+from copsense.arrays import finite_array, whole_number
 from copsense.batch.choice import choices
 from copsense.batch.clear import fill_row, sole_edges
 from copsense.batch.layout import layout, not_covered
@@ -79,7 +79,8 @@ class BatchKernel:
 
     def empty(self, count: int) -> BatchResult:
         """Arrays for the results of `count` postures, to be filled with ``out=``."""
-        return empty_result(self.stance, self.names, count, gains=self.gains)
+        size = whole_number(count, "the number of postures", least=0)
+        return empty_result(self.stance, self.names, size, gains=self.gains)
 
     def evaluate(
         self,
@@ -90,12 +91,11 @@ class BatchKernel:
     ) -> BatchResult:
         """Evaluate every criterion at every configuration; see `evaluate_batch`."""
         q = self._checked(configurations)
-        if int(threads) != threads or threads < 1:
-            raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
+        threads = whole_number(threads, "threads")
         result = self.empty(len(q)) if out is None else self._fitting(out, len(q))
         doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
         if not self.why_clear and len(q):
-            self._run(q, result, doubtful, int(threads))
+            self._run(q, result, doubtful, threads)
         reasons = {}
         for i, j in np.argwhere(doubtful):
             row, column = int(i), int(j)
@@ -178,25 +178,36 @@ class BatchKernel:
         robot = self.stance.robot
         nq = robot.model.nq
         what = f"the configurations of robot {robot.name!r}"
-        q = np.ascontiguousarray(configurations) if _is_plain(configurations) else configurations
-        if not (isinstance(q, np.ndarray) and q.shape == (len(q), nq) and np.isfinite(q).all()):
+        q = configurations
+        if not (_is_plain(q) and q.shape[1] == nq and np.isfinite(q).all()):
             q = finite_array(configurations, what, (None, nq), "one configuration in each row")
+        # An array that differs in any of these would have the kernel compiled anew.
+        q = np.require(q, np.float64, ["C", "A", "W", "E"])
         if robot.base_nv == 6:
             length = np.einsum("ij,ij->i", q[:, 3:7], q[:, 3:7])
             bad = np.flatnonzero(np.abs(length - 1.0) > _UNIT)
             # Whoever is refused here is refused by the robot itself, which words it.
             for row in bad:
-                robot.check_configuration(q[row])
-        return np.asarray(q)
+                try:
+                    robot.check_configuration(q[row])
+                except InvalidInputError as error:
+                    raise InvalidInputError(f"row {row}: {error}") from None
+        return q
 
     def _fitting(self, out: BatchResult, count: int) -> BatchResult:
+        if not isinstance(out, BatchResult):
+            raise InvalidInputError(
+                f"out is of type {type(out).__name__}. Make it with BatchKernel.empty({count})."
+            )
         for name, array in _arrays(out).items():
             first = 0 if name.startswith("com_") and not self.gains else count
             shape = (first, *self._shapes[name][1:])
-            if array.shape != shape or not array.flags.c_contiguous or not array.flags.writeable:
+            fits = array.shape == shape and array.dtype == np.float64
+            if not (fits and array.flags.carray):
                 raise InvalidInputError(
-                    f"out.{name} has shape {array.shape}, or is not contiguous and writable; the "
-                    f"batch needs {shape}. Make it with BatchKernel.empty({count})."
+                    f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
+                    f"writeable; the batch needs float64 of shape {shape}. Make it with "
+                    f"BatchKernel.empty({count})."
                 )
         if out.criteria != self.names:
             raise InvalidInputError(
@@ -261,5 +272,5 @@ def _is_row(value: object, nq: int) -> bool:
     )
 
 
-def _is_plain(value: object) -> bool:
+def _is_plain(value: object) -> TypeGuard[np.ndarray]:
     return isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim == 2

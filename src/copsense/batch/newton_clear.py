@@ -61,22 +61,27 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
         given[axis] += given[model.nv + axis] - plan.given[model.nv + axis]
     q, placed = stance.q, plan.given[: model.nv]  # where q stands
     before, steps = np.inf, 0
+    worst, which = np.inf, 0
     while True:
+        if not np.isfinite(given[: model.nv]).all():  # values so large that their squares overflow
+            return Attempt(q, worst, steps, STUCK, which, 0.0)
         q = _moved(stance, plan, q, placed, given[: model.nv])
         placed = given[: model.nv].copy()
         here = stance.at(q, check=False)
         h, opposite = _errors(here, plan, given)
         sizes = np.abs(h)
         worst = max(float(sizes.max()), float(opposite))
+        which = int(sizes.argmax())
         hopeless = steps % PATIENCE == 0 and steps > 0 and worst > PROGRESS * before
         if worst < TOLERANCE:
-            status, which, excess = _within(here, plan)
-            return Attempt(here.q, worst, steps, status, which, excess)
+            status, joint, excess = _within(here, plan)
+            return Attempt(here.q, worst, steps, status, joint, excess)
         if steps >= MOST_STEPS or hopeless:
             status = UNSOLVED if steps >= MOST_STEPS else STUCK
-            return Attempt(here.q, worst, steps, status, int(sizes.argmax()), 0.0)
+            return Attempt(here.q, worst, steps, status, which, 0.0)
         before = worst if steps % PATIENCE == 0 else before
-        _advance(here, plan, given, h)
+        with np.errstate(over="ignore", invalid="ignore"):
+            _advance(here, plan, given, h)
         steps += 1
 
 

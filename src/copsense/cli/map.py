@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -16,7 +17,7 @@ from copsense.cli.options import (
     read_stance,
     stance_options,
 )
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.maps import Axis, MapSummary
@@ -109,6 +110,7 @@ def map_command(
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
     from copsense.maps import map_postures
+    from copsense.maps.reach import height_advice
     from copsense.maps.sampling import sampling_of
     from copsense.maps.store import check_store
     from copsense.storage import check_output
@@ -118,10 +120,15 @@ def map_command(
         check_output(plot, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
         if len(over) < 2:
             raise InvalidInputError("--plot draws over two coordinates. Give --over twice.")
+    elif plot_over is not None:
+        raise InvalidInputError("--plot-over is for a picture. Give --plot FILE too.")
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
+    pair = _pair(plot_over, sampling.names)
+    if not Path(output).exists() and (advice := height_advice(stance, sampling)):
+        click.echo(f"note: {advice}", err=True)
     done = 0
     with progress_bar(len(sampling), "map") as update:
 
@@ -152,7 +159,7 @@ def map_command(
             )
             click.get_current_context().exit(130)
     if plot is not None:
-        _draw(stance, summary, plot, plot_over, marginal, force)
+        _draw(stance, summary, plot, pair, marginal, force)
     if as_json:
         echo_json(_as_json(summary, plot))
     else:
@@ -190,20 +197,45 @@ def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:
     return found
 
 
+def _pair(text: str | None, known: tuple[str, ...]) -> tuple[str, str] | None:
+    """The two coordinates of ``NAME,NAME``, asked for before the work starts."""
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(","))
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("coordinate of the map", name, known)
+    if len(set(names)) != 2 or len(names) != 2:
+        raise InvalidInputError(
+            f"--plot-over is {text!r}. Give two coordinates of the map, such as "
+            f"--plot-over {known[0]},{known[-1]}."
+        )
+    return names[0], names[1]
+
+
 def _draw(
-    stance: Stance, summary: MapSummary, plot: str, over: str | None, how: Any, force: bool
+    stance: Stance,
+    summary: MapSummary,
+    plot: str,
+    names: tuple[str, str] | None,
+    how: Any,
+    force: bool,
 ) -> None:
     from copsense.maps import load_map, marginal, skeleton, worst_stances
     from copsense.plots import plot_map, save_figure
 
     dataset = load_map(summary.path)
-    names = tuple(name.strip() for name in over.split(",")) if over else None
     marginals = [
-        marginal(dataset, names, quantity, how)  # type: ignore[arg-type]
+        marginal(dataset, names, quantity, how)
         for quantity in ("least_com_travel", "largest_com_gain")
     ]
     worst = {
-        name: [skeleton(here) for here in worst_stances(stance, row.worst_travel[:3])]
+        name: [
+            skeleton(here)
+            for here in worst_stances(
+                stance, [w for w in row.worst_travel[:3] if math.isfinite(w.value)]
+            )
+        ]
         for name, row in summary.criteria.items()
     }
     save_figure(plot_map(marginals, worst), plot, overwrite=force)
@@ -230,6 +262,7 @@ def _as_json(summary: MapSummary, plot: str | None) -> dict[str, Any]:
                 "worst_gain": [vars(w) for w in row.worst_gain],
                 "travel_percentiles": row.travel_percentiles,
                 "gain_percentiles": row.gain_percentiles,
+                "failed": {status: vars(first) for status, first in row.failed.items()},
             }
             for name, row in summary.criteria.items()
         },
@@ -240,12 +273,20 @@ def _print(summary: MapSummary, plot: str | None) -> None:
     over = ", ".join(summary.coordinates)
     click.echo(f"{summary.robot}: {summary.postures} postures over {over}")
     units = dict(zip(summary.coordinates, summary.units, strict=True))
+    told: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
     for name, row in summary.criteria.items():
         shares = ", ".join(
             f"{count / summary.postures:.1%} {kind}" for kind, count in row.counts.items() if count
         )
         click.echo(f"  {name}: {shares}")
-        if row.worst_travel:
+        for status, first in row.failed.items():
+            if (status, first.posture) not in told:
+                reason = first.reason.removeprefix(f"{status}: ")
+                click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
+            told.add((status, first.posture))
+        if row.worst_travel and math.isinf(row.worst_travel[0].value):
+            click.echo("    CoM travel: without end, no contact can tip")
+        elif row.worst_travel:
             worst = row.worst_travel[0]
             middle = row.travel_percentiles[50.0]
             click.echo(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import pickle
+import socket
 import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -18,12 +19,16 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from copsense.arrays import whole_number
 from copsense.errors import CopsenseError, InvalidInputError, MissingExtraError, SchedulerError
 from copsense.maps.evaluation import ChunkEvaluator
 from copsense.maps.plan import MapPlan
 from copsense.maps.store import MapStore, open_map
 
 _TIMEOUT = 5.0  # s for a scheduler to answer
+_PATIENCE = 60.0  # s for the first worker to join
+# A terminal's Ctrl-C goes to the workers too, which would only be loud about it.
+_DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 _AHEAD = 4  # chunks that are sent out for each thread of the workers
 
 
@@ -34,7 +39,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     Raises:
         InvalidInputError: both are given, or no worker.
         MissingExtraError: Dask Distributed is not installed.
-        SchedulerError: nothing answers at the address.
+        SchedulerError: nothing answers at the address, or no worker joins.
     """
     if scheduler is not None and workers is not None:
         raise InvalidInputError(
@@ -45,13 +50,13 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     except ImportError:
         raise MissingExtraError("distributed", "cluster", "a cluster") from None
     if scheduler is not None:
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # the error says it all
+        _silence()
         try:
             # A thread of its own, since the caller's may have a loop that runs, as notebooks do.
             with ThreadPoolExecutor(1) as thread:
                 thread.submit(asyncio.run, _answer(scheduler)).result()
             client = distributed.Client(scheduler, timeout=_TIMEOUT)
-        except (OSError, ValueError, TimeoutError) as error:
+        except Exception as error:  # whatever an address makes of itself
             late = f"no answer within {_TIMEOUT:g} s"
             raise SchedulerError(
                 f"no Dask scheduler answers at {scheduler} ({str(error) or late}). Start one "
@@ -59,22 +64,41 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                 "tcp://127.0.0.1:8786."
             ) from None
         with client:
+            _await_worker(client)
             yield client
         return
-    if workers is None or workers != int(workers) or workers < 1:
-        raise InvalidInputError(f"there are {workers} local workers. Give a number from 1.")
+    number = whole_number(workers, "the number of local workers")
     with (
         distributed.LocalCluster(
-            n_workers=int(workers),
+            n_workers=number,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
+            preload=_DEAF,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
         yield client
+
+
+def _await_worker(client: Any) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_PATIENCE)
+    except TimeoutError:
+        where = client.scheduler.address
+        raise SchedulerError(
+            f"no worker has joined {where} within {_PATIENCE:g} s. Start some with "
+            f"`dask worker {where} --nthreads 1`, and run the same again."
+        ) from None
+
+
+def _silence() -> None:
+    """The error says it all; Dask gives loggers inside its own levels of their own."""
+    for name in ["distributed", *logging.root.manager.loggerDict]:
+        if name.partition(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 async def _answer(scheduler: str) -> None:
@@ -97,8 +121,9 @@ def evaluate_there(
     """Have the workers evaluate these chunks and write them into the store.
 
     Raises:
-        SchedulerError: a worker cannot take part, or workers died over the same chunk.
-        OutputError: a worker does not see the store, or cannot write it.
+        SchedulerError: a worker cannot take part or does not see the store, workers died over the
+            same chunk, or the scheduler is gone.
+        OutputError: a worker cannot write the store.
     """
     import distributed
 
@@ -132,6 +157,11 @@ def evaluate_there(
     except CopsenseError:
         raise
     except Exception as error:
+        if client.status != "running":
+            raise SchedulerError(
+                f"the scheduler at {client.scheduler.address} is gone. The chunks that are done "
+                "are kept; start it and its workers, and run the same again to go on."
+            ) from None
         raise SchedulerError(
             f"the workers could not go on ({type(error).__name__}: {str(error)[:300]}). They need "
             f"copsense with the same version and extras as here, and the folder {store.path}. The "
@@ -149,6 +179,11 @@ def evaluate_chunk(package: bytes, path: str, index: int) -> int:
     """
     from copsense.maps.mapping import write_chunk
 
+    if not Path(path).exists():
+        raise SchedulerError(
+            f"the worker on {socket.gethostname()} does not see the store {path}, into which it "
+            "writes. Give --output on a file system that all workers share, under the same path."
+        )
     evaluator, store = _prepared(package, path)
     write_chunk(evaluator, store, index)
     start, stop = evaluator.plan.bounds(index)

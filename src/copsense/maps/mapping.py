@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from copsense.arrays import whole_number
 from copsense.criterion import Criterion
-from copsense.errors import InvalidInputError
 from copsense.limits import Limits
 from copsense.maps.evaluation import ChunkEvaluator
 from copsense.maps.plan import MapPlan
@@ -73,15 +73,14 @@ def map_postures(
         SchedulerError: the scheduler or its workers cannot be reached, or gave up.
         MissingExtraError: Zarr or Dask is not installed.
     """
-    if threads != int(threads) or threads < 1:
-        raise InvalidInputError(f"threads is {threads!r}. Give a whole number from 1.")
-    plan = MapPlan(stance, tuple(criteria), sampling, limits, int(chunk), configurations)
+    threads = whole_number(threads, "threads")
+    plan = MapPlan(stance, tuple(criteria), sampling, limits, chunk, configurations)
     where = check_store(path)
     evaluator = ChunkEvaluator(plan)
     report: Progress = progress or (lambda _: None)
     if scheduler is None and workers is None:
         store = create_map(where, plan)
-        _evaluate_here(evaluator, store, _pending(plan, store, report), int(threads), report)
+        _evaluate_here(evaluator, store, _pending(plan, store, report), threads, report)
     else:
         from copsense.maps.cluster import connect, evaluate_there
 

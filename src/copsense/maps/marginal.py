@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,8 +13,11 @@ from jaxtyping import Float
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.maps.columns import EVALUATED
 from copsense.maps.reduction import QUANTITIES
+from copsense.maps.store import map_parameters
 
-_BINS = 48  # along each coordinate where the values are not few
+_BINS = 48  # at most, along each coordinate of a sample, or of a grid of many values
+_IN_CELL = 4  # postures of a sample, on average
+_WIDTH = 1e-3  # m or rad of a cell that stands alone
 _HOW = ("worst", "median")
 
 
@@ -49,8 +53,8 @@ def marginal(
 ) -> Marginal:
     """Reduce a map to two of its coordinates.
 
-    A coordinate of few values, as a grid has, keeps them; others are put into bins. The quantity is
-    read for one criterion at a time: a few bytes a posture.
+    A grid keeps its values, unless they are very many; a sample is put into bins, the fewer the
+    fewer its postures. The quantity is read for one criterion at a time: a few bytes a posture.
 
     Args:
         dataset: what `load_map` gives.
@@ -76,7 +80,8 @@ def marginal(
             f"a picture is drawn over two coordinates, got {', '.join(names)}. The map has "
             f"{', '.join(known)}."
         )
-    cells = [_cells(np.asarray(dataset[name].values)) for name in names]
+    sampled = map_parameters(dataset.attrs)["sampling"]["kind"] == "sample"
+    cells = [_cells(np.asarray(dataset[name].values), sampled) for name in names]
     shape = tuple(len(edges) - 1 for edges, _ in cells)
     cell = np.ravel_multi_index((cells[0][1], cells[1][1]), shape)
     criteria = tuple(str(c) for c in dataset["criterion"].values)
@@ -99,16 +104,18 @@ def marginal(
     )
 
 
-def _cells(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _cells(values: np.ndarray, sampled: bool) -> tuple[np.ndarray, np.ndarray]:
     """Edges of cells, and the cell of each value."""
     known = np.unique(values)
-    if 1 < len(known) <= 4 * _BINS:
+    if len(known) == 1:
+        return known[0] + np.array([-0.5, 0.5]) * _WIDTH, np.zeros(len(values), dtype=np.int64)
+    if not sampled and len(known) <= 4 * _BINS:
         middles = (known[1:] + known[:-1]) / 2
         first, last = known[0] - (middles[0] - known[0]), known[-1] + (known[-1] - middles[-1])
         return np.concatenate([[first], middles, [last]]), np.searchsorted(known, values)
-    low, high = float(known[0]), float(known[-1])
-    edges = np.linspace(low, high if high > low else low + 1e-9, _BINS + 1)
-    return edges, np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _BINS - 1)
+    bins = min(_BINS, math.isqrt(len(values) // _IN_CELL) or 1)
+    edges = np.linspace(known[0], known[-1], bins + 1)
+    return edges, np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
 
 
 def _reduced(signed: np.ndarray, cell: np.ndarray, shape: tuple[int, ...], how: str) -> np.ndarray:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from copsense._version import __version__
+from copsense.arrays import whole_number
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
@@ -53,8 +54,7 @@ class MapPlan:
                     f"a map takes criteria, not {criterion!r}: what a law computes cannot be "
                     "written into the store. Give Criterion values."
                 )
-        if self.chunk != int(self.chunk) or self.chunk < 1:
-            raise InvalidInputError(f"a chunk has {self.chunk} postures. Give a number from 1.")
+        object.__setattr__(self, "chunk", whole_number(self.chunk, "the size of a chunk"))
         if self.limits is not None and not self.limits.any:
             object.__setattr__(self, "limits", None)
 
@@ -133,6 +133,12 @@ def _unequal(where: str, stored: Any, asked: Any) -> str:
 
 
 def _short(value: Any) -> str:
+    if (
+        isinstance(value, list)
+        and value
+        and all(isinstance(v, dict) and "name" in v for v in value)
+    ):
+        value = [v["name"] for v in value]
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

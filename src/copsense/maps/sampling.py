@@ -12,10 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from copsense.arrays import finite_number
+from copsense.arrays import finite_number, whole_number
 from copsense.errors import InvalidInputError, UnknownNameError
 
 _BITS = 30  # of SciPy's Sobol points: 2^30 of them
+_MOST = 2**40  # postures of a grid: a year of one machine
 _SEQUENCES = ("sobol", "halton")
 
 
@@ -40,9 +41,7 @@ class Axis:
         start = finite_number(self.start, f"the start of {self.name}")
         stop = finite_number(self.stop, f"the end of {self.name}")
         count = self.count
-        if count is not None and (
-            count != int(count) or count < 1 or (count == 1) != (start == stop)
-        ):
+        if count is not None and not _divides(count, start == stop):
             raise InvalidInputError(
                 f"{self.name} runs from {start:g} to {stop:g} in {count} values. Give a whole "
                 "number of 2 or more, or 1 where both ends are the same."
@@ -57,6 +56,14 @@ class Axis:
         last = max((self.count or 1) - 1, 1)
         # Both ends are met exactly, and a value depends on its index alone.
         return np.asarray(self.start * ((last - index) / last) + self.stop * (index / last))
+
+
+def _divides(count: object, single: bool) -> bool:
+    """Whether a range can have so many values: one where its ends are the same, or more."""
+    try:
+        return (whole_number(count, "count") == 1) == single
+    except InvalidInputError:
+        return False
 
 
 class _Axes:
@@ -103,6 +110,11 @@ class Grid(_Axes):
     def __post_init__(self) -> None:
         """Refuse an axis that is named twice or not counted."""
         self._check(counted=True)
+        if math.prod(self.shape) > _MOST:
+            raise InvalidInputError(
+                f"a grid of {' x '.join(map(str, self.shape))} has more than {_MOST} postures. "
+                "Give smaller counts, or a sample."
+            )
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -144,12 +156,11 @@ class Sample(_Axes):
         if self.sequence not in _SEQUENCES:
             raise UnknownNameError("low-discrepancy sequence", self.sequence, _SEQUENCES)
         most = 2**_BITS
-        if self.count != int(self.count) or not 1 <= self.count <= most:
+        if whole_number(self.count, "the number of postures of a sample") > most:
             raise InvalidInputError(
                 f"a sample has {self.count} postures. Give a whole number from 1 to {most}."
             )
-        if self.seed != int(self.seed) or self.seed < 0:
-            raise InvalidInputError(f"the seed is {self.seed}. Give a whole number from 0.")
+        whole_number(self.seed, "the seed", least=0)
 
     def __len__(self) -> int:
         """Number of postures."""

@@ -14,7 +14,7 @@ import os
 import shutil
 import tempfile
 import warnings
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -56,7 +56,7 @@ class MapStore:
     def __init__(self, path: Path, group: Any) -> None:
         """Take hold of an open group; use `open_map` or `create_map`."""
         self.path, self._group = path, group
-        self.parameters: dict[str, Any] = json.loads(group.attrs[_PARAMETERS])
+        self.parameters = map_parameters(group.attrs)
         self.coordinates: tuple[str, ...] = tuple(group.attrs["over"])
         self._arrays = dict(group.arrays())
         self._parts = dict(group["parts"].arrays())
@@ -90,6 +90,10 @@ class MapStore:
         with self._errors("be read"):
             return np.asarray(self._arrays["done"][:]).astype(bool)
 
+    def bounds(self, chunk: int) -> tuple[int, int]:
+        """First posture of a chunk, and the one after its last."""
+        return chunk * self._size, min((chunk + 1) * self._size, len(self))
+
     def read(self, column: str, start: int, stop: int) -> np.ndarray:
         """Rows of a column."""
         with self._errors("be read"):
@@ -98,8 +102,7 @@ class MapStore:
     def chunks(self, column: str, criterion: int) -> Iterator[np.ndarray]:
         """A column of the postures that were evaluated, for one criterion, chunk by chunk."""
         for i in np.flatnonzero(self.done()):
-            start = int(i) * self._size
-            stop = min(start + self._size, len(self))
+            start, stop = self.bounds(int(i))
             status = self.read("status", start, stop)[:, criterion]
             yield self.read(column, start, stop)[:, criterion][status == EVALUATED]
 
@@ -135,6 +138,11 @@ class MapStore:
                 f"{'free some space' if full else 'make it accessible'}, and run the same again "
                 "to go on."
             ) from None
+
+
+def map_parameters(attributes: Mapping[Hashable, Any]) -> dict[str, Any]:
+    """What decides a map's numbers, from its attributes."""
+    return dict(json.loads(attributes[_PARAMETERS]))
 
 
 def check_store(path: str | Path) -> Path:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from copsense.maps.columns import STATUS
-from copsense.maps.reduction import QUANTITIES, fold, percentiles
+from copsense.maps.columns import EVALUATED, STATUS
+from copsense.maps.reduction import QUANTITIES, Part, fold, percentiles
 from copsense.maps.store import MapStore
 
 LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
@@ -30,6 +30,21 @@ class WorstPosture:
 
 
 @dataclass(frozen=True)
+class FailedPosture:
+    """The first posture that was not evaluated, of those of one status.
+
+    Attributes:
+        posture: its number.
+        coordinates: where it is, by name [m, rad].
+        reason: why it was not.
+    """
+
+    posture: int
+    coordinates: Mapping[str, float]
+    reason: str
+
+
+@dataclass(frozen=True)
 class CriterionSummary:
     """A map under one criterion.
 
@@ -40,6 +55,7 @@ class CriterionSummary:
         travel_percentiles: percent -> the least CoM travel [m] that this share of the evaluated
             postures does not exceed.
         gain_percentiles: the same of the largest CoM gain.
+        failed: status -> the first posture of it, with its reason.
     """
 
     counts: Mapping[str, int]
@@ -47,6 +63,7 @@ class CriterionSummary:
     worst_gain: tuple[WorstPosture, ...]
     travel_percentiles: Mapping[float, float]
     gain_percentiles: Mapping[float, float]
+    failed: Mapping[str, FailedPosture]
 
 
 @dataclass(frozen=True)
@@ -82,9 +99,12 @@ class MapSummary:
 def summarise(store: MapStore) -> MapSummary:
     """Fold the parts of the chunks that are done, in their order."""
     done = store.done()
-    total = None
+    total: Part | None = None
+    first: dict[tuple[int, int], int] = {}  # chunk with the first posture of a status
     for i in np.flatnonzero(done):
         part = store.part(int(i))
+        for j, code in np.argwhere(part.counts > 0):
+            first.setdefault((int(j), int(code)), int(i))
         total = part if total is None else fold(total, part)
     criteria = {}
     for j, criterion in enumerate(store.criteria):
@@ -104,6 +124,11 @@ def summarise(store: MapStore) -> MapSummary:
             worst["largest_com_gain"],
             shares["least_com_travel"],
             shares["largest_com_gain"],
+            {
+                STATUS[code]: _failed(store, chunk, j, code)
+                for (column, code), chunk in sorted(first.items())
+                if column == j and code != EVALUATED
+            },
         )
     return MapSummary(
         str(store.path),
@@ -118,8 +143,20 @@ def summarise(store: MapStore) -> MapSummary:
 
 
 def _posture(store: MapStore, row: int, value: float) -> WorstPosture:
-    where = {
+    return WorstPosture(row, _place(store, row), value)
+
+
+def _failed(store: MapStore, chunk: int, criterion: int, code: int) -> FailedPosture:
+    """The first posture of a status in a chunk that has one."""
+    start, stop = store.bounds(chunk)
+    status = store.read("status", start, stop)[:, criterion]
+    row = start + int(np.flatnonzero(status == code)[0])
+    reason = str(store.read("reason", row, row + 1)[0, criterion])
+    return FailedPosture(row, _place(store, row), reason)
+
+
+def _place(store: MapStore, row: int) -> dict[str, float]:
+    return {
         name: float(store.read(column, row, row + 1)[0])
         for name, column in zip(store.names, store.coordinates, strict=True)
     }
-    return WorstPosture(row, where, value)

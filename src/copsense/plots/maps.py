@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
@@ -17,11 +17,13 @@ from copsense.maps.marginal import Marginal
 from copsense.plots.reading import MM
 from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
 
-# quantity -> (words, unit shown, factor, format of a contour's label)
+# quantity -> (words, unit shown, factor)
 _SHOWN = {
-    "least_com_travel": ("CoM travel", "mm", MM, "%.0f"),
-    "largest_com_gain": ("CoM gain", "m/m", 1.0, "%.2f"),
+    "least_com_travel": ("CoM travel", "mm", MM),
+    "largest_com_gain": ("CoM gain", "m/m", 1.0),
 }
+_NONE = "no posture was evaluated"
+_UNLIMITED = "without end: no contact can tip"
 _LEVELS = 7  # contour lines
 _SHADES = (1.0, 0.55, 0.3)  # of the worst posture, the next and the one after
 
@@ -60,28 +62,33 @@ def plot_map(
         _draw_postures(ax, name, list((worst or {}).get(name, ())))
     if worst and columns > len(criteria):
         grid[-1, -1].set_axis_off()
+    if any(np.isnan(here.values).any() for here in marginals):
+        figure.supxlabel(f"Pale: {_NONE} there.", fontsize=9, color=MUTED)
     return figure
 
 
 def _draw_row(figure: Figure, axes: np.ndarray, here: Marginal) -> None:
-    words, unit, factor, text = _SHOWN[here.quantity]
+    words, unit, factor = _SHOWN[here.quantity]
     values = here.values * factor
     shown = np.where(np.isfinite(values), values, np.nan)
     low, high = _range(shown)
+    if np.isinf(values).any() and not np.isfinite(values).any():
+        for ax in axes:
+            _say(ax, _UNLIMITED)
     for ax, name, cells in zip(axes, here.criteria, shown, strict=False):
-        mesh = _heat(ax, here, cells, text, cmap="viridis", vmin=low, vmax=high)
-        ax.set_title(f"{name}: {here.how} {words}", fontsize=9)
+        mesh = _heat(ax, here, cells, cmap="viridis", vmin=low, vmax=high)
+        ax.set_title(f"{name}\n{here.how} {words}", fontsize=9)
     bar = figure.colorbar(mesh, ax=list(axes[: len(shown)]), aspect=30)
     bar.set_label(f"{words} [{unit}]")
     if len(shown) > 1:
         ax, change = axes[-1], shown[1] - shown[0]
         reach = max(abs(v) for v in _range(change)) or 1.0
-        mesh = _heat(ax, here, change, text, cmap="RdBu", vmin=-reach, vmax=reach)
-        ax.set_title(f"{here.criteria[1]} less {here.criteria[0]}", fontsize=9)
+        mesh = _heat(ax, here, change, cmap="RdBu", vmin=-reach, vmax=reach)
+        ax.set_title(f"{here.criteria[1]}\nless {here.criteria[0]}", fontsize=9)
         figure.colorbar(mesh, ax=ax, aspect=30).set_label(f"difference [{unit}]")
 
 
-def _heat(ax: Axes, here: Marginal, cells: np.ndarray, text: str, **colour: Any) -> Any:
+def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
     """Cells in colour, and contour lines through their middles."""
     edges = [
         np.degrees(e) if unit == "rad" else e * MM
@@ -93,17 +100,20 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, text: str, **colour: Any)
     mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(cells.T), shading="flat", **colour)
     mesh.set_rasterized(True)
     known = cells[np.isfinite(cells)]
+    if not len(known) and not ax.texts:
+        _say(ax, _NONE)
     # The same levels in a row: what is flat beside the other has no line.
     levels = MaxNLocator(_LEVELS).tick_values(colour["vmin"], colour["vmax"])
     crossed = [
         level for level in levels if known.min(initial=np.inf) < level < known.max(initial=-np.inf)
     ]
     if min(cells.shape) > 1 and crossed:
-        ink = "white" if colour["cmap"] == "viridis" else INK
+        ink, halo = ("white", INK) if colour["cmap"] == "viridis" else (INK, "white")
         lines = ax.contour(
             *middles, np.ma.masked_invalid(cells.T), levels=crossed, colors=ink, linewidths=0.7
         )
-        ax.clabel(lines, fmt=text, fontsize=7)
+        for label in ax.clabel(lines, fmt=_level, fontsize=7):
+            label.set_path_effects([withStroke(linewidth=1.2, foreground=halo)])
     words = [
         f"{name} [{'deg' if unit == 'rad' else 'mm'}]"
         for name, unit in zip(here.names, here.units, strict=True)
@@ -113,14 +123,26 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, text: str, **colour: Any)
     return mesh
 
 
+def _level(value: float) -> str:
+    """A contour's label: all its digits, for half a step is none that may be rounded away."""
+    return f"{value + 0.0:.6g}"
+
+
+def _say(ax: Axes, words: str) -> None:
+    """Words in the middle of what has nothing to show."""
+    ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=MUTED)
+
+
 def _draw_postures(ax: Axes, name: str, skeletons: Sequence[np.ndarray]) -> None:
     """Skeletons in the frontal plane, as one who stands before the robot sees them."""
     for lines, shade in zip(skeletons[: len(_SHADES)], _SHADES, strict=False):
         for segment in lines:
             ax.plot(segment[:, 1], segment[:, 2], color=INK, alpha=shade, linewidth=1.6)
+    if not skeletons:
+        _say(ax, "none")
     ax.axhline(0.0, color=MUTED, linewidth=COM_LINE["linewidth"])
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_title(f"{name}: postures of least travel", fontsize=9)
+    ax.set_title(f"{name}\npostures of least travel", fontsize=9)
     ax.set_xlabel("world y [m]")
     ax.set_ylabel("world z [m]")
 
@@ -131,4 +153,4 @@ def _range(values: np.ndarray) -> tuple[float, float]:
     if not len(known):
         return 0.0, 1.0
     low, high = float(known.min()), float(known.max())
-    return low, high if high > low else math.nextafter(low, math.inf)
+    return low, high if high > low else low + 1.0
