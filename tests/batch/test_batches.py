@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -58,6 +59,26 @@ def test_one_posture_is_a_batch_of_one(case, many):
     assert len(one) == 1
 
 
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda q: q.astype(object),
+        lambda q: q.astype(">f8"),
+        lambda q: q.tolist(),
+        np.asfortranarray,
+        lambda q: np.repeat(q, 2, axis=0)[::2],
+        lambda q: np.frombuffer(b"1" + q.tobytes(), offset=1).reshape(q.shape),
+    ],
+)
+def test_numbers_may_lie_as_they_like_and_compile_nothing_anew(case, many, change):
+    from copsense.batch.kernel import run
+
+    kernel = BatchKernel(case("icub"), [TORQUE])
+    expected, known = kernel.evaluate(many[:11]).gradient, len(run.signatures)
+    assert np.array_equal(kernel.evaluate(change(many[:11])).gradient, expected)
+    assert len(run.signatures) == known
+
+
 def test_no_posture_is_an_empty_batch(case):
     found = evaluate_batch(case("icub"), np.zeros((0, 30)), [TORQUE])
     assert len(found) == 0
@@ -72,6 +93,8 @@ def test_no_posture_is_an_empty_batch(case):
         (lambda q: np.where(np.arange(30) == 9, np.nan, q), "not finite"),
         (lambda q: q * 1.01, "unit length"),
         (lambda q: "posture", "not an array"),
+        (lambda q: q + 0j, "not an array"),
+        (lambda q: np.where(np.arange(3)[:, None] == 1, q * 1.01, q), "row 1: .*unit length"),
     ],
 )
 def test_bad_configurations_are_refused(case, many, change, message):
@@ -92,11 +115,18 @@ def test_bad_requests_are_refused(case, many):
         evaluate_batch(stance, q, [TORQUE, TORQUE])
     with pytest.raises(copsense.CopsenseError, match="distinct names"):
         evaluate_batch(stance, q, [])
-    with pytest.raises(copsense.CopsenseError, match="threads"):
-        evaluate_batch(stance, q, [TORQUE], threads=0)
+    for threads in (0, -1, 1.5, None, "2", np.nan):
+        with pytest.raises(copsense.CopsenseError, match="threads is"):
+            evaluate_batch(stance, q, [TORQUE], threads=threads)
     kernel = BatchKernel(stance, [TORQUE])
     with pytest.raises(copsense.CopsenseError, match="shape"):
         kernel.evaluate(q, out=kernel.empty(4))
+    made = kernel.empty(3)
+    for out in (np.zeros(3), replace(made, com=made.com.astype(np.float32))):
+        with pytest.raises(copsense.CopsenseError, match=r"out is of type|out\.com is float32"):
+            kernel.evaluate(q, out=out)
+    with pytest.raises(copsense.CopsenseError, match="number of postures is -1"):
+        kernel.empty(-1)
     with pytest.raises(copsense.CopsenseError, match="criteria"):
         kernel.evaluate(q, out=BatchKernel(stance, [TORQUE.named("other")]).empty(3))
 

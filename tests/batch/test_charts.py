@@ -336,3 +336,12 @@ def test_names_are_those_that_make_sense(case):
     assert "LF_FOOT:yaw" not in quadruped  # a point has no heading
     wall = coordinate_names(case("icub, hand on a wall"))
     assert not [n for n in wall if n.startswith("hand:")]
+
+
+def test_an_absurd_row_is_a_row_and_takes_no_other_with_it(case):
+    chart = PostureChart(case("icub"), ["com_y", "com_z"])
+    values = np.array([[1e160, 0.5], [0.0, 0.5], [1e300, -1e300]])
+    batch = chart.solve(values)  # warnings are errors
+    assert list(batch.converged) == [False, True, False]
+    assert np.isnan(batch.configurations[[0, 2]]).all()
+    assert all(reason.startswith("unreachable") for reason in batch.reasons[[0, 2]])

@@ -1,5 +1,6 @@
 """``copsense map``: what it prints, writes and refuses."""
 
+import importlib.util
 import signal
 from unittest.mock import patch
 
@@ -11,6 +12,7 @@ import copsense
 from copsense.maps import load_map, mapping
 
 GRID = ("map", "icub", "--over", "com_y=-0.05:0.05:9", "--over", "roll=-4:4:5", "--over")
+TWO = ("--over", "com_y=0:1:3", "--over", "com_z=0:1:3")
 COMMAND = (*GRID, "com_z=0.47:0.51:3", "--chunk", "40", "--threads", "2")
 
 
@@ -83,6 +85,10 @@ def test_stopping_says_how_to_go_on(tmp_path):
         (("--over", "com_y=0:1:3", "--over", "com_y=0:1:3"), "twice"),
         (("--over", "com_y=0:1:3", "--over", "base_y=0:1:3"), "the one decides the other"),
         (("--over", "com_y=0:1:3", "--plot", "m.png"), "two coordinates"),
+        ((*TWO, "--plot-over", "com_y,com_z"), "Give --plot FILE too"),
+        ((*TWO, "--plot", "m.png", "--plot-over", "com_y,yaw"), "Valid: com_y, com_z"),
+        ((*TWO, "--plot", "m.png", "--plot-over", "com_y"), "Give two coordinates"),
+        (("--over", f"com_y=0:1:{10**30}"), "more than"),
         (("--over", "com_y=0:1:3", "--chunk", "0"), "from 1"),
         (("--over", "com_y=0:1:3", "--threads", "0"), "from 1"),
         (("--over", "com_y=0:1:3", "--local", "0"), "from 1"),
@@ -93,3 +99,33 @@ def test_what_is_not_understood_is_one_line(arguments, word, tmp_path, monkeypat
     answer = run("map", "icub", *arguments, "--output", "m.zarr")
     assert word in answer.error
     assert not list(tmp_path.iterdir())
+
+
+def test_postures_lost_are_told_with_the_remedy_and_the_reason(tmp_path):
+    ranges = ("--over", "com_x=-0.06:0.06:5", "--over", "com_y=-0.06:0.06:5")
+    answer = run("map", "icub", *ranges, "--output", tmp_path / "m.zarr")
+    assert answer.code == 1
+    assert "note: of 25 postures tried" in answer.err
+    assert "--over com_z=" in answer.err
+    assert "unreachable, first at com_x -0.0600 m, com_y -0.0600 m: contact" in answer.out
+
+
+def test_points_alone_have_no_travel_to_be_the_least(tmp_path):
+    ranges = ("--over", "com_x=-0.01:0.01:3", "--over", "com_y=-0.01:0.01:3")
+    outputs = ("--output", tmp_path / "m.zarr", "--plot", tmp_path / "m.png")
+    answer = run("map", "solo12", *ranges, "--criterion", "minimum-torque", *outputs)
+    assert answer.code == 0, answer.err
+    assert "CoM travel: without end" in answer.out
+    assert "inf" not in answer.out
+
+
+def test_without_numba_the_command_says_that_it_will_take_long(tmp_path, monkeypatch):
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *a: None if name == "numba" else find(name, *a)
+    )
+    answer = run("map", "icub", "--over", "com_y=0:0.01:2", "--output", tmp_path / "m.zarr")
+    assert answer.code == 0
+    assert (
+        'one at a time, milliseconds each: Numba is not installed (pip install "cop' in answer.err
+    )

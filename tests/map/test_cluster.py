@@ -12,7 +12,7 @@ import pytest
 
 import copsense
 from copsense.errors import CopsenseError, SchedulerError
-from copsense.maps import Axis, Sample
+from copsense.maps import Axis, Sample, cluster
 
 
 def _workers():
@@ -92,6 +92,88 @@ def test_a_scheduler_that_does_not_answer_is_one_error_and_nothing_written(
         copsense.map_postures(icub, sample, both, tmp_path / "m.zarr", scheduler=address)
     assert time.monotonic() - start < 10
     assert not list(tmp_path.iterdir())
+
+
+def test_a_tls_address_is_no_scheduler_either(icub, both, sample, tmp_path):
+    with pytest.raises(SchedulerError, match=r"no Dask scheduler answers at tls://127\.0\.0\.1:9"):
+        copsense.map_postures(
+            icub, sample, both, tmp_path / "m.zarr", scheduler="tls://127.0.0.1:9"
+        )
+
+
+SCHEDULER = """
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers={}, threads_per_worker=1, host="127.0.0.1",
+                      dashboard_address=None, processes=False) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        input()
+"""
+
+
+@pytest.fixture
+def scheduler(request):
+    """A scheduler and its workers in a process: the process and the address."""
+    command = [sys.executable, "-c", SCHEDULER.format(request.param)]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment, text=True) as process:
+        yield process, process.stdout.readline().strip()
+        process.kill()
+
+
+@pytest.mark.parametrize("scheduler", [0], indirect=True)
+def test_a_scheduler_without_workers_is_given_up_on(
+    scheduler, icub, both, sample, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
+    with pytest.raises(SchedulerError, match=r"no worker has joined tcp://.* dask worker tcp://"):
+        copsense.map_postures(icub, sample, both, tmp_path / "m.zarr", scheduler=scheduler[1])
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("scheduler", [1], indirect=True)
+def test_a_scheduler_that_dies_is_one_quiet_error_and_the_map_goes_on_after_it(
+    scheduler, icub, both, sample, whole, tmp_path, same, capfd
+):
+    path = tmp_path / "m.zarr"
+    with pytest.raises(SchedulerError, match=r"is gone\. The chunks that are done are kept"):
+        copsense.map_postures(
+            icub,
+            sample,
+            both,
+            path,
+            chunk=32,
+            scheduler=scheduler[1],
+            progress=lambda _: scheduler[0].kill(),
+        )
+    assert "Traceback" not in capfd.readouterr().err
+    copsense.map_postures(icub, sample, both, path, chunk=32)
+    assert same(path, whole[0])
+
+
+def test_a_worker_that_does_not_see_the_store_says_so(tmp_path):
+    with pytest.raises(SchedulerError, match=r"does not see the store .*all workers share"):
+        cluster.evaluate_chunk(b"", str(tmp_path / "m.zarr"), 0)
+
+
+def test_ctrl_c_in_a_terminal_is_quiet_though_it_goes_to_the_workers_too(tmp_path):
+    store = tmp_path / "m.zarr"
+    arguments = ["map", "icub", "--over", "com_y=-0.05:0.05", "--over", "com_z=0.46:0.52"]
+    arguments += ["--samples", "60000", "--chunk", "100", "--local", "2", "--output", str(store)]
+    command = [sys.executable, "-c", "from copsense.cli import main; main()", *arguments]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    process = subprocess.Popen(
+        command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    until = time.monotonic() + 60
+    while len(list(store.glob("done/c/*"))) < 5 and time.monotonic() < until:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "Run the same command again" in said
 
 
 def test_a_cluster_is_one_or_the_other(icub, both, sample, tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import copsense
-from copsense.maps import load_map, marginal, skeleton
+from copsense.maps import Axis, Grid, Marginal, load_map, marginal, skeleton
 from copsense.plots import plot_map
 
 
@@ -40,14 +40,48 @@ def test_a_marginal_is_the_worst_or_the_middle_of_what_it_leaves_out(gridded, gr
 def test_a_sample_is_drawn_in_bins(whole, icub):
     dataset = load_map(whole[0])
     here = marginal(dataset, ("com_y", "com_z"))
-    assert len(here.edges[0]) == 49
+    assert len(here.edges[0]) == 1 + 8  # some four postures in each of 8 x 8 cells
+    assert np.isfinite(here.values).mean() > 0.7
     lowest = np.nanmin(here.values, axis=(1, 2))
     rows = whole[1].criteria.values()
     assert lowest == pytest.approx([row.worst_travel[0].value for row in rows])
     figure = plot_map([here], {"minimum-torque": [skeleton(icub)]})
     titles = [ax.get_title(loc="left") for ax in figure.axes]
-    assert "minimum-torque less minimum-wrench" in titles
-    assert "minimum-torque: worst CoM travel" in titles
+    assert "minimum-torque\nless minimum-wrench" in titles
+    assert "minimum-torque\nworst CoM travel" in titles
+
+
+def _marginal(values, quantity="least_com_travel"):
+    edges = tuple(np.arange(n + 1.0) for n in values.shape)
+    return Marginal(("a", "b"), ("m", "m"), quantity, "worst", edges, ("one",), values[None])
+
+
+def test_a_contours_label_is_its_level():
+    figure = plot_map([_marginal(np.linspace(1.0, 1.2, 60).reshape(10, 6), "largest_com_gain")])
+    figure.draw_without_rendering()
+    labels = [float(text.get_text()) for text in figure.axes[0].texts]
+    assert len(labels) >= 5
+    steps = np.diff(sorted(set(labels)))
+    assert np.allclose(steps, steps[0], rtol=1e-6)  # 1.025 is not called 1.02
+
+
+def test_what_nothing_can_be_drawn_of_says_why():
+    texts = {}
+    for value in (np.nan, np.inf):
+        figure = plot_map([_marginal(np.full((3, 4), value))], {"one": []})
+        texts[value] = [text.get_text() for ax in figure.axes for text in ax.texts]
+        assert (figure._supxlabel is not None) == np.isnan(value)
+    assert texts[np.nan] == ["no posture was evaluated", "none"]
+    assert texts[np.inf] == ["without end: no contact can tip", "none"]
+
+
+def test_a_coordinate_of_one_value_fills_the_picture(icub, both, tmp_path):
+    grid = Grid((Axis("com_y", -0.02, 0.02, 3), Axis("com_z", 0.5, 0.5, 1)))
+    copsense.map_postures(icub, grid, both, tmp_path / "m.zarr")
+    here = marginal(load_map(tmp_path / "m.zarr"))
+    assert here.values.shape == (2, 3, 1)
+    assert np.isfinite(here.values).all()
+    assert here.edges[1][0] < 0.5 < here.edges[1][1]
 
 
 def test_a_skeleton_ends_on_the_contacts(icub):

@@ -9,7 +9,17 @@ import xarray as xr
 import copsense
 from copsense.batch import PostureChart
 from copsense.errors import CopsenseError
-from copsense.maps import Axis, Grid
+from copsense.maps import Axis, Grid, Sample
+from copsense.maps.reach import height_advice
+
+
+def _grid_of(ranges):
+    return Grid(tuple(Axis(n, *r, 1 if r[0] == r[1] else 9) for n, r in ranges.items()))
+
+
+def _sample_of(ranges):
+    return Sample(tuple(Axis(n, *r) for n, r in ranges.items()), 81)
+
 
 NEAR = 2e-6  # float32 against the clear path
 
@@ -173,3 +183,28 @@ def test_what_does_not_fit_is_refused_and_leaves_nothing(icub, both, sample, tmp
         with pytest.raises(CopsenseError, match=word):
             copsense.map_postures(*arguments)
         assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("make", [_grid_of, _sample_of])
+def test_lost_for_its_height_a_map_is_told_the_height_that_has_its_postures(icub, make):
+    wide = {"com_x": (-0.06, 0.06), "com_y": (-0.06, 0.06)}
+    advice = height_advice(icub, make(wide))
+    low, high = map(float, re.search(r"com_z=([\d.]+):([\d.]+)", advice).groups())
+    followed = make(wide | {"com_z": (low, high)})
+    values = [make(wide).values(0, len(make(wide))), followed.values(0, len(followed))]
+    charts = PostureChart(icub, list(wide)), PostureChart(icub, followed.names)
+    shares = [c.solve(v).converged.mean() for c, v in zip(charts, values, strict=True)]
+    assert shares[0] < 0.5 < 0.9 < shares[1]
+    assert not height_advice(icub, followed)
+    assert not height_advice(icub, make({"com_y": (-0.01, 0.01)}))  # few are lost
+    assert not height_advice(icub, make({"com_y": (5.0, 6.0)}))  # no height helps
+
+
+def test_the_summary_names_the_first_that_failed_and_why(whole):
+    dataset = copsense.load_map(whole[0])
+    row = int(np.flatnonzero(dataset["status"].values[:, 1] == 1)[0])
+    first = whole[1].criteria["minimum-torque"].failed
+    assert list(first) == ["unreachable"]
+    assert first["unreachable"].posture == row
+    assert first["unreachable"].reason == dataset["reason"].values[row, 1]
+    assert first["unreachable"].coordinates["com_z"] == dataset["com_z"].values[row]

@@ -109,6 +109,7 @@ def map_command(
     sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
+    from copsense.batch import BatchKernel
     from copsense.maps import map_postures
     from copsense.maps.reach import height_advice
     from copsense.maps.sampling import sampling_of
@@ -127,8 +128,11 @@ def map_command(
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)
-    if not Path(output).exists() and (advice := height_advice(stance, sampling)):
-        click.echo(f"note: {advice}", err=True)
+    if not Path(output).exists():
+        why = BatchKernel(stance, chosen).why_clear
+        slow = f"postures are evaluated one at a time, milliseconds each: {why}" if why else ""
+        for note in filter(None, (slow, height_advice(stance, sampling))):
+            click.echo(f"note: {note}", err=True)
     done = 0
     with progress_bar(len(sampling), "map") as update:
 

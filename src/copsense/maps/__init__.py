@@ -9,11 +9,12 @@ from copsense.maps.marginal import Marginal, marginal
 from copsense.maps.plan import MapPlan
 from copsense.maps.sampling import Axis, Grid, Sample
 from copsense.maps.skeleton import skeleton, worst_stances
-from copsense.maps.summary import CriterionSummary, MapSummary, WorstPosture
+from copsense.maps.summary import CriterionSummary, FailedPosture, MapSummary, WorstPosture
 
 __all__ = [
     "Axis",
     "CriterionSummary",
+    "FailedPosture",
     "Grid",
     "MapPlan",
     "MapSummary",
