@@ -9,6 +9,7 @@ import pytest
 from stances import postures, served
 
 import copsense
+from copsense.arrays import whole_number
 from copsense.batch import BatchKernel, evaluate_batch
 from copsense.batch.result import array_names
 
@@ -115,20 +116,26 @@ def test_bad_requests_are_refused(case, many):
         evaluate_batch(stance, q, [TORQUE, TORQUE])
     with pytest.raises(copsense.CopsenseError, match="distinct names"):
         evaluate_batch(stance, q, [])
-    for threads in (0, -1, 1.5, None, "2", np.nan):
+    for threads in (0, -1):
         with pytest.raises(copsense.CopsenseError, match="threads is"):
             evaluate_batch(stance, q, [TORQUE], threads=threads)
     kernel = BatchKernel(stance, [TORQUE])
     with pytest.raises(copsense.CopsenseError, match="shape"):
         kernel.evaluate(q, out=kernel.empty(4))
     made = kernel.empty(3)
-    for out in (np.zeros(3), replace(made, com=made.com.astype(np.float32))):
-        with pytest.raises(copsense.CopsenseError, match=r"out is of type|out\.com is float32"):
-            kernel.evaluate(q, out=out)
+    with pytest.raises(copsense.CopsenseError, match=r"out\.com is float32"):
+        kernel.evaluate(q, out=replace(made, com=made.com.astype(np.float32)))
     with pytest.raises(copsense.CopsenseError, match="number of postures is -1"):
         kernel.empty(-1)
     with pytest.raises(copsense.CopsenseError, match="criteria"):
         kernel.evaluate(q, out=BatchKernel(stance, [TORQUE.named("other")]).empty(3))
+
+
+@pytest.mark.parametrize("value", [0, -1, 1.5, None, "2", np.nan, np.inf, np.arange(2), 1j])
+def test_what_is_no_whole_number_is_refused(value):
+    with pytest.raises(copsense.CopsenseError, match=r"threads is .* whole number from 1"):
+        whole_number(value, "threads")
+    assert whole_number(np.int64(3), "threads") == whole_number(3.0, "threads") == 3
 
 
 def test_importing_copsense_does_not_import_numba():

@@ -105,7 +105,7 @@ SCHEDULER = """
 from distributed import LocalCluster
 if __name__ == "__main__":
     with LocalCluster(n_workers={}, threads_per_worker=1, host="127.0.0.1",
-                      dashboard_address=None, processes=False) as cluster:
+                      dashboard_address=None, processes=False, protocol="tcp") as cluster:
         print(cluster.scheduler_address, flush=True)
         input()
 """
@@ -127,7 +127,7 @@ def test_a_scheduler_without_workers_is_given_up_on(
     scheduler, icub, both, sample, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
-    with pytest.raises(SchedulerError, match=r"no worker has joined tcp://.* dask worker tcp://"):
+    with pytest.raises(SchedulerError, match=r"no worker has joined tcp://.*dask worker tcp://"):
         copsense.map_postures(icub, sample, both, tmp_path / "m.zarr", scheduler=scheduler[1])
     assert not list(tmp_path.iterdir())
 
