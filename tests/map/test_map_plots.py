@@ -57,7 +57,7 @@ def _marginal(values, quantity="least_com_travel"):
 
 
 def test_a_contours_label_is_its_level():
-    figure = plot_map([_marginal(np.linspace(1.0, 1.2, 60).reshape(10, 6), "largest_com_gain")])
+    figure = plot_map([_marginal(np.linspace(1.0, 1.17, 60).reshape(10, 6), "largest_com_gain")])
     figure.draw_without_rendering()
     labels = [float(text.get_text()) for text in figure.axes[0].texts]
     assert len(labels) >= 5
