@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import zarr
 
 import copsense
-from copsense.maps import Axis, Grid, Marginal, load_map, marginal, skeleton
+from copsense.maps import Axis, Grid, Marginal, Sample, load_map, marginal, skeleton
 from copsense.plots import plot_map
 
 
@@ -73,6 +74,34 @@ def test_what_nothing_can_be_drawn_of_says_why():
         assert (figure._supxlabel is not None) == np.isnan(value)
     assert texts[np.nan] == ["no posture was evaluated", "none"]
     assert texts[np.inf] == ["without end: no contact can tip", "none"]
+
+
+class _StopError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("kind", ["grid", "sample"])
+def test_what_is_done_of_a_map_is_drawn(kind, icub, both, box, grid, tmp_path):
+    sampling = grid if kind == "grid" else Sample(box, 150)
+    path = tmp_path / "m.zarr"
+
+    def stop(_):
+        raise _StopError
+
+    with pytest.raises(_StopError):
+        copsense.map_postures(icub, sampling, both, path, chunk=41, progress=stop)
+    dataset = load_map(path)
+    here = marginal(dataset)
+    lowest = np.nanmin(dataset["least_com_travel"].values[:41], axis=0)
+    assert np.nanmin(here.values, axis=(1, 2)) == pytest.approx(lowest)
+    assert (
+        len(here.edges[0]) == 1 + 3
+    )  # 41 are of three values of com_y, or some four in each of 3 x 3 cells
+    plot_map([here]).draw_without_rendering()
+    group = zarr.open_group(path, mode="r+")
+    group["done"][0] = 0
+    with pytest.raises(copsense.CopsenseError, match="no posture of the map is evaluated yet"):
+        marginal(load_map(path))
 
 
 def test_a_coordinate_of_one_value_fills_the_picture(icub, both, tmp_path):

@@ -51,7 +51,7 @@ def marginal(
     quantity: str = "least_com_travel",
     how: Literal["worst", "median"] = "worst",
 ) -> Marginal:
-    """Reduce a map to two of its coordinates.
+    """Reduce a map, or what is done of it, to two of its coordinates.
 
     A grid keeps its values, unless they are very many; a sample is put into bins, the fewer the
     fewer its postures. The quantity is read for one criterion at a time: a few bytes a posture.
@@ -63,7 +63,7 @@ def marginal(
         how: ``"worst"`` (least travel, largest gain) or ``"median"`` (the lower one).
 
     Raises:
-        InvalidInputError: the map has a single coordinate, or one is named twice.
+        InvalidInputError: the map has a single coordinate, one is named twice, or no chunk is done.
         UnknownNameError: a coordinate, quantity or reduction that does not exist.
     """
     known = tuple(dataset.attrs["over"])
@@ -81,6 +81,7 @@ def marginal(
             f"{', '.join(known)}."
         )
     sampled = map_parameters(dataset.attrs)["sampling"]["kind"] == "sample"
+    dataset = dataset.isel(posture=_visited(dataset))
     cells = [_cells(np.asarray(dataset[name].values), sampled) for name in names]
     shape = tuple(len(edges) - 1 for edges, _ in cells)
     cell = np.ravel_multi_index((cells[0][1], cells[1][1]), shape)
@@ -102,6 +103,17 @@ def marginal(
         criteria,
         values,
     )
+
+
+def _visited(dataset: xr.Dataset) -> slice | np.ndarray:
+    """The rows of the chunks that are done: all of a complete map."""
+    done = np.asarray(dataset["done"].values) > 0
+    if done.all():
+        return slice(None)
+    if not done.any():
+        raise InvalidInputError("no posture of the map is evaluated yet. Make the map go on first.")
+    size = map_parameters(dataset.attrs)["chunk"]
+    return np.flatnonzero(np.repeat(done, size)[: dataset.sizes["posture"]])
 
 
 def _cells(values: np.ndarray, sampled: bool) -> tuple[np.ndarray, np.ndarray]:
