@@ -7,10 +7,9 @@ import pytest
 from reproductions import small_reproduction
 
 import copsense
-from copsense.closed_loop import sway_in_simulation
 from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel
 from copsense.report import report_figures, write_report
-from copsense.reproduction import LIMITS
+from copsense.reproduction import LIMITS, sway_in_simulation
 
 WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 
