@@ -13,19 +13,24 @@ from narrow import C1, C2, LEAN, ROBOT, STRAIGHT, one, plan
 
 import copsense
 from copsense.benchmark import (
+    Breaking,
     Case,
     Conditions,
     ControllerChoice,
+    Falls,
     Lean,
     PostureChoice,
+    PushToTip,
     Rest,
     RobotChoice,
+    Sway,
     load_benchmark,
     make_plan,
     run_benchmark,
     run_case,
 )
 from copsense.errors import InvalidInputError, OutputError
+from copsense.limits import Limits
 from copsense.simulation import Motors
 
 SOURCE = Path(copsense.__file__).parents[1]
@@ -155,6 +160,41 @@ def test_a_run_that_fails_is_a_row_with_its_reason(case, says):
     assert says in score.reason
 
 
+TRIALS = (
+    LEAN,
+    PushToTip(largest=1.0, resolution=0.5),
+    Breaking("delay", mild=0.0, severe=0.02, step=0.01, amplitude=2e-3),
+    Falls(repeats=1),
+    Rest(0.1),
+    Sway(2e-3, 1.0),
+)
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: type(trial).__name__)
+def test_a_controller_that_fails_on_the_way_has_measured_nothing(trial, tmp_path, monkeypatch):
+    (tmp_path / "late_controllers.py").write_text(LATE)
+    monkeypatch.chdir(tmp_path)
+    limits = Limits(friction=0.5) if isinstance(trial, Falls) else None
+    late = ControllerChoice("minimum-wrench", source="late_controllers:Late", limits=limits)
+    scores = run_case(one(trial, late))
+    assert [s.status for s in scores] == ["failed"] * len(trial.scores)
+    assert all("no idea at 0.05" in s.reason for s in scores)
+
+
+LATE = """
+from copsense.controllers import BalancingController
+from copsense.criterion import minimum_wrench
+
+class Late(BalancingController):
+    def __init__(self, stance):
+        super().__init__(stance, minimum_wrench(1.0))
+
+    def __call__(self, observation):
+        if observation.time > 0.0495:
+            raise RuntimeError(f"no idea at {observation.time:.2f}")
+        return super().__call__(observation)
+"""
+
 OWN = """
 import os
 from copsense.controllers import BalancingController
@@ -185,6 +225,18 @@ def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, mon
     assert "no idea" in table.loc["bad", "reason"]
     assert list(table["status"]) == ["failed", "measured", "failed"]
     assert table.loc["good", "value"] == run_case(one(LEAN))[0].value
+
+
+@pytest.mark.parametrize("jobs", [None, 1])
+def test_a_controller_that_leaves_is_a_row_too(jobs, tmp_path, monkeypatch):
+    (tmp_path / "leaving_controllers.py").write_text(
+        "def leave(stance):\n    raise SystemExit(0)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    leaving = ControllerChoice("minimum-wrench", source="leaving_controllers:leave", name="leave")
+    table = run_benchmark(plan([LEAN], [leaving, C2]), jobs=jobs)
+    assert list(table["status"]) == ["failed", "measured"]
+    assert "SystemExit" in table["reason"][0]
 
 
 def test_conditions_are_those_of_a_scenario():

@@ -108,9 +108,10 @@ def test_a_controller_that_answers_nonsense(answer, says):
     assert "at 0.020 s" in recording.attrs["end_reason"]
 
 
-def test_a_controller_that_raises():
+@pytest.mark.parametrize("kind", [RuntimeError, SystemExit])
+def test_a_controller_that_raises(kind):
     def broken(observation):
-        raise RuntimeError("out of ideas")
+        raise kind("out of ideas")
 
     with pytest.raises(ControllerError, match=r"'broken' at 0.000 s raised.*out of ideas"):
         rollout(Statue(icub()), broken, Scenario(0.1))

@@ -20,10 +20,7 @@ from copsense.controllers import (
     lateral_reference,
     load_controller,
 )
-from copsense.errors import (
-    CopsenseError,
-    UnreachablePostureError,
-)
+from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
 from copsense.simulation import MujocoSimulator, Push, Scenario, rollout
 from copsense.stance import Stance
 
@@ -76,19 +73,26 @@ class Bench:
         push: Push | None = None,
         **changes: Any,
     ) -> xr.Dataset:
-        """One rollout in the case's conditions, with a push or changed fields on top."""
+        """One rollout in the case's conditions, with a push or changed fields on top.
+
+        Raises:
+            ControllerError: the controller failed on the way, which tells nothing of the robot.
+        """
         values = dict(self.case.conditions.values or {}) | changes
         if push is not None:
             values["pushes"] = (*values.get("pushes", ()), push)
         scenario = Scenario(duration, reference, **values)
         tick = self._progress
-        return rollout(
+        run = rollout(
             self._simulator,
             self.controller,
             scenario,
             until=until,
             progress=None if tick is None else lambda n: tick(n * scenario.control_period),
         )
+        if run.attrs["end_kind"] == "controller":
+            raise ControllerError(str(run.attrs["end_reason"]))
+        return run
 
     def lean(self, reach: float | None, speed: float, sign: float) -> tuple[PathReference, float]:
         """The reference of a lateral lean, and how far it goes [m].

@@ -33,7 +33,7 @@ def run_case(case: Case, progress: Callable[[float], object] | None = None) -> l
         return score_trial(Bench(case, progress))
     except CopsenseError as error:
         return failed(case.trial.scores, str(error))
-    except Exception as error:  # a user's controller or a library: its row says so
+    except (Exception, SystemExit) as error:  # a user's controller or a library: its row says so
         return failed(case.trial.scores, f"{type(error).__name__}: {error}")
 
 
@@ -41,7 +41,7 @@ def run_benchmark(
     plan: Sequence[Case],
     output: str | Path | None = None,
     *,
-    jobs: int = 1,
+    jobs: int | None = None,
     overwrite: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> pd.DataFrame:
@@ -54,8 +54,9 @@ def run_benchmark(
     Args:
         plan: the cases, with distinct names.
         output: the table, ``.csv``; None keeps it in memory.
-        jobs: how many processes, each with one BLAS thread. More than one needs a main module
-            that can be imported, as `multiprocessing` has it.
+        jobs: how many processes, each with one BLAS thread; a controller or a library that
+            crashes then costs its own case alone. They need a main module that can be imported,
+            as `multiprocessing` has it. None runs the cases here, in turn.
         overwrite: start a table anew that is there already.
         progress: called with the share of the plan done since the last call, out of 1.
 
@@ -68,7 +69,7 @@ def run_benchmark(
             cannot be written.
     """
     check_plan(plan)
-    if jobs < 1:
+    if jobs is not None and jobs < 1:
         raise InvalidInputError(f"a benchmark cannot run in {jobs} processes. Give 1 or more.")
     path = None if output is None else check_output(output, suffixes=(".csv",), overwrite=True)
     done: dict[str, list[Score]] = {}
@@ -90,10 +91,9 @@ def run_benchmark(
             tick(case, left[case.key])
         else:
             missing.append(case)
-    in_turn = jobs == 1 or len(missing) < 2
     running = (
         run_here(missing, run_case, tick)
-        if in_turn
+        if jobs is None
         else run_in_processes(missing, run_case, min(jobs, len(missing)), tick)
     )
     for case, scores in running:

@@ -125,7 +125,7 @@ def benchmark(
         with _bar() as update:
             table = run_benchmark(plan, output, jobs=processes, overwrite=force, progress=update)
     except KeyboardInterrupt:
-        if output is not None:
+        if output is not None and Path(output).exists():
             click.echo(
                 f"\nthe cases that were done are kept in {output}; the same command"
                 f"{' without --force' if force else ''} goes on with the others.",

@@ -39,7 +39,7 @@ def load_controller(source: str, stance: Stance) -> Controller:
         sys.path.insert(0, here)
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InvalidInputError(
             f"the controller's module {module_name!r} cannot be imported "
             f"({type(error).__name__}: {error}). Mend it, run the command in its folder, or "
@@ -56,7 +56,7 @@ def load_controller(source: str, stance: Stance) -> Controller:
     if _made_of_a_stance(made):
         try:
             made = made(stance)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ControllerError(
                 f"{source} raised {type(error).__name__} when made of the stance: {error}. It is "
                 "called with the stance alone."
