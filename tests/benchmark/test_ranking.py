@@ -43,6 +43,17 @@ def test_a_bound_counts_as_far_as_it_goes_and_a_failure_comes_last():
     assert found == {"a": 1, "b": 3, "c": 1, "d": 4}
 
 
+def test_where_everything_failed_nobody_wins():
+    rows = [row(name, np.nan, status="failed", posture="p") for name in "ab"]
+    rows += [row(name, np.nan, status="none", posture="q") for name in "ab"]
+    assert rank_controllers(pd.DataFrame(rows)).empty
+    rows += [row("a", 1.0, posture="r"), row("b", np.nan, status="tipped", posture="r")]
+    found = rank_controllers(pd.DataFrame(rows)).set_index("controller")
+    assert found["wins"].to_dict() == {"a": 1, "b": 0}
+    assert found["failures"].to_dict() == {"a": 0, "b": 1}
+    assert found["settings"].to_dict() == {"a": 1, "b": 1}
+
+
 def test_ranks_are_taken_in_each_setting_and_averaged():
     rows = [
         row(name, value, posture=posture)

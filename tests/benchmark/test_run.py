@@ -227,6 +227,31 @@ def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, mon
     assert table.loc["good", "value"] == run_case(one(LEAN))[0].value
 
 
+def test_new_code_of_a_controller_is_another_parameter(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    module, table = tmp_path / "changing_controllers.py", tmp_path / "table.csv"
+    mine = ControllerChoice("minimum-wrench", source="changing_controllers:good", name="mine")
+    module.write_text(OWN)
+    with monkeypatch.context() as patched:
+        patched.setattr("copsense.benchmark.run.score_trial", lambda bench: 1 / 0)
+        run_benchmark(plan([LEAN], [mine, C2]), table)
+    # What failed is run again, and its code may be another by now.
+    module.write_text(OWN + "\n# mended")
+    first = run_benchmark(plan([LEAN], [mine, C2]), table)
+    assert list(first["status"]) == ["measured"] * 2
+    module.write_text(OWN + "\n# changed")
+    with pytest.raises(OutputError, match=r"controller\.content was"):
+        run_benchmark(plan([LEAN], [mine, C2]), table)
+
+
+def test_a_case_of_which_rows_are_missing_is_run_again(whole, tmp_path):
+    path = tmp_path / "table.csv"
+    lines = whole[0].read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if ",cop_error," not in line))
+    run_benchmark(plan(), path)
+    assert path.read_text() == whole[0].read_text()
+
+
 @pytest.mark.parametrize("jobs", [None, 1])
 def test_a_controller_that_leaves_is_a_row_too(jobs, tmp_path, monkeypatch):
     (tmp_path / "leaving_controllers.py").write_text(

@@ -119,9 +119,18 @@ class Bench:
     def statics(self, reference: PathReference) -> tuple[Statics | None, str]:
         """What the statics say along a reference; or nothing, and why."""
         try:
-            return statics(reference, self.criterion, self.limits), ""
+            return statics(reference, self.criterion, self.limits, self._friction), ""
         except CopsenseError as error:
             return None, f"no static prediction: {error}"
+
+    @property
+    def _friction(self) -> float:
+        """Of the ground when a run starts."""
+        friction = self._simulator.settings.friction
+        for change in (self.case.conditions.values or {}).get("friction", ()):
+            if change.start <= 0 and change.contact is None:
+                friction = change.friction
+        return friction
 
     @cached_property
     def leg_joints(self) -> tuple[str, ...]:

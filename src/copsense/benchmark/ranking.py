@@ -31,14 +31,17 @@ def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
 
     A controller's rank is 1 plus the number of those clearly better: whose interval lies wholly
     beyond its own. Within their resolution controllers share a rank. A run that failed
-    or tipped too early comes last.
+    or tipped too early comes last; where every one did, or nothing can be measured, none is ranked.
 
     Returns:
-        The rows of the table with ``rank`` and ``of``, the number of controllers in the setting.
+        The rows of the table that are ranked with ``rank`` and ``of``, the number of controllers in
+        the setting.
     """
-    ranked = table.copy()
+    told = ~table["status"].isin(["failed", "tipped", "none"])
+    some = told.groupby([table[name] for name in _SETTING]).transform("any")
+    ranked = table[some & (table["status"] != "none")].copy()
     ranked["rank"], ranked["of"] = 1, 1
-    for (*_, score), rows in table.groupby(_SETTING, sort=False):
+    for (*_, score), rows in ranked.groupby(_SETTING, sort=False):
         larger = SCORES[str(score)].larger
         failed = rows["status"].isin(["failed", "tipped"]).to_numpy()
         # Better is larger from here on.
@@ -58,8 +61,8 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         A row for each trial, score and controller, the best first, with ``mean_rank``, ``wins``
-        (settings in which none is better), ``settings``, ``failures`` (failed or tipped), and
-        ``mean`` of the values (NaN where one was not measured).
+        (settings in which none is better), ``settings``, ``failures`` (of these, failed or tipped),
+        and ``mean`` of the values (NaN where one was not measured).
     """
     ranked, rows = rank_scores(table), []
     for (trial, score), group in ranked.groupby(["trial", "score"], sort=False):

@@ -48,8 +48,9 @@ def run_benchmark(
     """Run every case of a plan into one table.
 
     With an output, the table is written anew, whole, after each case. If it is there already, its
-    rows are kept and only what is missing is run; an interrupted run is so resumed. The table is
-    the same, bit for bit, whatever the number of processes and however often it was interrupted.
+    rows are kept and only what is missing or failed is run; an interrupted run is so resumed. The
+    table is the same, bit for bit, whatever the number of processes and however often it was
+    interrupted.
 
     Args:
         plan: the cases, with distinct names.
@@ -74,7 +75,7 @@ def run_benchmark(
     path = None if output is None else check_output(output, suffixes=(".csv",), overwrite=True)
     done: dict[str, list[Score]] = {}
     if path is not None and path.exists() and not overwrite:
-        done = scores_of(finished_rows(path, plan))
+        done = finished_scores(path, plan)
     total = sum(case.trial.seconds for case in plan)
     left = {case.key: case.trial.seconds for case in plan}
 
@@ -122,20 +123,30 @@ def check_plan(plan: Sequence[Case]) -> None:
         seen[case.label] = case.key
 
 
-def finished_rows(path: Path, plan: Sequence[Case]) -> pd.DataFrame:
-    """The rows of a table that a plan can go on with.
+def finished_scores(path: Path, plan: Sequence[Case]) -> dict[str, list[Score]]:
+    """The scores in a table that a plan need not run again, by the case's key.
+
+    A case that failed is run again: its controller may be mended, or the memory be there now. So is
+    one of which rows are missing.
 
     Raises:
         OutputError: it was made by other parameters; the message says what differs.
     """
     table = load_benchmark(path)
+    lost = table.loc[table["status"] == "failed", "key"]
+    table = table[~table["key"].isin(lost)]
     if unlike := differences(table, plan):
         shown = "; ".join(unlike[:6]) + ("; ..." if len(unlike) > 6 else "")
         raise OutputError(
             f"{path} was made by other parameters: {shown}. Give another path, or --force "
             "(overwrite=True) to start it anew."
         )
-    return table
+    whole = {case.key: list(case.trial.scores) for case in plan}
+    return {
+        key: scores
+        for key, scores in scores_of(table).items()
+        if [score.score for score in scores] == whole[key]
+    }
 
 
 def _finished(

@@ -15,6 +15,16 @@ from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
 
+def controller_code(source: str) -> bytes:
+    """What the module of ``MODULE:ATTRIBUTE`` holds, without running it; nothing if not found."""
+    module = Path(*source.partition(":")[0].split("."))
+    for folder in (Path.cwd(), *map(Path, sys.path)):
+        for path in (folder / module.with_suffix(".py"), folder / module / "__init__.py"):
+            if path.is_file():
+                return path.read_bytes()
+    return b""
+
+
 def load_controller(source: str, stance: Stance) -> Controller:
     """A controller from ``MODULE:ATTRIBUTE``, the module found here or installed.
 
