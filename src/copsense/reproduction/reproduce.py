@@ -28,11 +28,11 @@ from copsense.reproduction.lateral import (
     sweep_sideways,
     vary_unit_of_length,
 )
-from copsense.reproduction.leans import leans_in_simulation
 from copsense.reproduction.limits import solve_within_limits
 from copsense.reproduction.provenance import ROBOT, describe_parameters, find_versions
 from copsense.reproduction.result import Reproduction
 from copsense.reproduction.sway import sway_in_simulation
+from copsense.reproduction.trials import benchmark_in_simulation
 from copsense.robots import load_stance
 from copsense.stance import Stance
 
@@ -81,10 +81,10 @@ def reproduce(
     within = solve_within_limits(stance, path, limits, clock)
     with clock.stage("unit of length"):
         unit = vary_unit_of_length(stance)
-    sway = leans = None
+    sway = benchmark = None
     if sway_frequency is not None:
         sway = _sway(stance, limits, sway_frequency, clock)
-        leans = leans_in_simulation(clock)
+        benchmark = benchmark_in_simulation(clock)
     with clock.stage("claims"):
         icub_claims = evaluate_icub_claims(lateral, four_bar)
         there = {c.claim.identifier: c.verdict for c in evaluate_icub_claims(at_sole, four_bar)}
@@ -100,7 +100,7 @@ def reproduce(
         unit_of_length=unit,
         within_limits=within,
         sway=sway,
-        leans=leans,
+        benchmark=benchmark,
         four_bar_claims=claims,
         icub_claims=icub_claims,
         sway_claims=() if sway is None else evaluate_sway_claims(sway),

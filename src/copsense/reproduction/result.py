@@ -74,8 +74,8 @@ class Reproduction:
         unit_of_length: criterion 1's dependence on L.
         within_limits: the same path within limits, and the regions that they leave the CoM.
         sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
-        leans: slow leans to the first tip in several postures, both criteria, as
-            `copsense.benchmark` tells them; None where the closed loop was left out.
+        benchmark: leans, pushes and a sway under both criteria, as `copsense.benchmark` tells
+            them; None where the closed loop was left out.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.
         sway_claims: Section V, judged in closed loop.
@@ -98,7 +98,7 @@ class Reproduction:
     unit_of_length: UnitOfLength
     within_limits: WithinLimits
     sway: Sway | None
-    leans: pd.DataFrame | None
+    benchmark: pd.DataFrame | None
     four_bar_claims: tuple[EvaluatedClaim, ...]
     icub_claims: tuple[EvaluatedClaim, ...]
     sway_claims: tuple[EvaluatedClaim, ...]

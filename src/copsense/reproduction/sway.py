@@ -96,4 +96,5 @@ def sway_in_simulation(
             criterion.name: run(f"closed loop: {criterion.name}, limits", criterion, wide, limits)
             for criterion in (wrench, torque)
         },
+        limits,
     )
