@@ -103,6 +103,7 @@ def test_a_picture_shows_bounds_failures_and_predictions():
             "key": f"{c}{p}{s}", "robot": "r", "posture": p, "controller": c, "conditions": "ideal",
             "trial": "lean", "score": s, "unit": "m", "status": status, "value": value,
             "low": low, "high": high, "predicted": predicted, "first_order": np.nan,
+            "parameters": "",
         }
         for c in ("minimum-wrench", "mine")
         for p, status, value, low, high, predicted in (

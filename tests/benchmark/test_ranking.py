@@ -1,5 +1,7 @@
 """What a table says: ranks as far as the scores can tell, and agreement with its interval."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -86,6 +88,14 @@ def test_agreement_is_that_of_another_implementation():
     assert found["largest_error"] == pytest.approx(np.abs(value - predicted).max())
     assert found["correlation"] == pytest.approx(expected.statistic)
     assert (found["low"], found["high"]) == pytest.approx(tuple(interval))
+
+
+def test_a_controller_of_ones_own_follows_a_law_of_its_own():
+    rows = [row("a", float(i), predicted=float(i)) for i in range(4)]
+    own = json.dumps({"controller": {"source": "mine:make"}})
+    rows.append(row("mine", 9.0, predicted=1.0, parameters=own))
+    found = agreement(pd.DataFrame(rows)).iloc[0]
+    assert (found["cases"], found["largest_error"]) == (4, 0.0)
 
 
 def test_few_cases_have_no_correlation():

@@ -227,6 +227,32 @@ def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, mon
     assert table.loc["good", "value"] == run_case(one(LEAN))[0].value
 
 
+FORGETFUL = (
+    OWN
+    + """
+class Tired:
+    \"\"\"Balances for twelve hundred calls, and then no more.\"\"\"
+
+    def __init__(self, stance):
+        self.inner, self.calls, self.n = good(stance), 0, len(stance.robot.torque_names)
+
+    def __call__(self, observation):
+        self.calls += 1
+        return self.inner(observation) if self.calls < 1300 else [0.0] * self.n
+"""
+)
+
+
+def test_a_controller_that_remembers_is_made_anew_for_each_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tired_controllers.py").write_text(FORGETFUL)
+    push = PushToTip(largest=1.0, resolution=0.1)
+    tired = ControllerChoice("minimum-wrench", source="tired_controllers:Tired")
+    (found,), (usual,) = (run_case(one(push, choice)) for choice in (tired, C1))
+    assert (found.low, found.high) == (usual.low, usual.high)
+    assert found.runs > 2
+
+
 def test_new_code_of_a_controller_is_another_parameter(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     module, table = tmp_path / "changing_controllers.py", tmp_path / "table.csv"
@@ -274,11 +300,13 @@ def test_conditions_are_those_of_a_scenario():
         Conditions("stormy", {"wind": 3.0})
 
 
-def test_a_key_is_that_of_the_parameters():
+def test_a_key_is_that_of_the_parameters(monkeypatch):
     again = one(Lean(0.015, 0.02))
     assert again.key == one(LEAN).key
     assert one(Lean(0.015, 0.021)).key != again.key
     assert one(LEAN, C2).key != again.key
+    monkeypatch.setattr("copsense.benchmark.cases._software", lambda: {"mujoco": "9.9"})
+    assert one(LEAN).key != again.key
 
 
 def test_plans_that_mean_nothing_are_refused(tmp_path):

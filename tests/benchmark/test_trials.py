@@ -25,7 +25,7 @@ from copsense.benchmark import (
 from copsense.benchmark.bench import Bench
 from copsense.benchmark.prediction import statics
 from copsense.benchmark.trials import SCORES, trial_named
-from copsense.controllers import Ramp, lateral_reference
+from copsense.controllers import Ramp, Sine, lateral_reference
 from copsense.limits import Limits
 from copsense.motion import lateral_sweep
 from copsense.sensitivity import cop_sensitivity
@@ -57,6 +57,11 @@ def test_the_paper_s_sway_tells_the_criteria_apart():
         found["smallest_margin"].predicted, abs=5e-4
     )
     assert found["com_error"].value < 1e-4
+    case = one(Sway(0.039, 0.05, 0.26), C2, robot=FULL)
+    bench = Bench(case)
+    run = bench.run(bench.reference(Sine(0.039, 0.05)), 5.2).sel(time=slice(1.0, None))
+    error = (run["com"] - run["com_target"]).sel(com_axis="y").values
+    assert found["com_error"].value == np.sqrt(np.mean(error**2))
     for name in ("torque_norm", "torque_peak"):
         assert found[name].value == pytest.approx(found[name].predicted, rel=0.05)
 
@@ -234,6 +239,10 @@ def test_the_legs_are_between_the_base_and_the_contacts():
         ("lean", {"side": "up"}, "up"),
         ("lean", {"parameter": "delay"}, "parameter"),
         ("push", {"resolution": -1}, "resolution"),
+        ("delay", {"mild": 0.05, "severe": 0.0}, "gets no worse"),
+        ("delay", {"mild": -1.0}, "0 or more"),
+        ("bandwidth", {"severe": -5.0}, "over 0"),
+        ("bandwidth", {"severe": 60.0}, "severe under mild"),
         ("falls", {"repeats": 0}, "repeats"),
         ("delay", {"step": 0}, "step"),
     ],

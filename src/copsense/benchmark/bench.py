@@ -50,9 +50,8 @@ class Bench:
         """Of the controller, and of what predicts a push."""
         return self.case.controller.gains_of(self.stance.robot)
 
-    @cached_property
-    def controller(self) -> Controller:
-        """What balances the robot."""
+    def make_controller(self) -> Controller:
+        """What balances the robot, anew for each run: it may remember."""
         choice = self.case.controller
         if choice.source:
             return load_controller(choice.source, self.stance)
@@ -85,7 +84,7 @@ class Bench:
         tick = self._progress
         run = rollout(
             self._simulator,
-            self.controller,
+            self.make_controller(),
             scenario,
             until=until,
             progress=None if tick is None else lambda n: tick(n * scenario.control_period),

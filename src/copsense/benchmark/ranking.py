@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
 
@@ -92,15 +94,22 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
     return found.drop(columns="_order").reset_index(drop=True)
 
 
+def _own(parameters: str) -> bool:
+    """Whether a case's controller is somebody's own."""
+    return bool(parameters and json.loads(parameters)["controller"].get("source"))
+
+
 def agreement(table: pd.DataFrame) -> pd.DataFrame:
     """How well the predictions hold, over the rows that were measured. See `CAVEAT`.
+
+    Controllers of one's own are left out: the prediction only assumes their law.
 
     Returns:
         A row per score and prediction (``"path"``, exact, or ``"first order"``): ``cases``, mean
         and largest absolute error in the score's unit, Pearson's ``correlation`` with the ends
         ``low`` and ``high`` of its 95 % interval (Fisher's z; NaN under four cases).
     """
-    rows = []
+    rows, table = [], table[~table["parameters"].map(_own)]
     for score in _COMPARED:
         of_score = table[(table["score"] == score) & (table["status"] == "measured")]
         for prediction, column in (("path", "predicted"), ("first order", "first_order")):

@@ -265,6 +265,14 @@ class Breaking:
             finite_number(getattr(self, name), f"{name} of the {self.parameter}")
         finite_number(self.step, f"the step of the {self.parameter}", positive=True)
         count_steps(self.mild, self.severe, self.step)  # type: ignore[arg-type]
+        rises = _RANGES[self.parameter][0] < _RANGES[self.parameter][1]
+        ends = (self.mild, self.severe) if rises else (self.severe, self.mild)
+        if not 0 <= ends[0] < ends[1] or (ends[0] == 0 and not rises):  # type: ignore[operator]
+            order = "0 or more, severe over mild" if rises else "over 0, severe under mild"
+            raise InvalidInputError(
+                f"the {self.parameter} from mild = {self.mild:g} to severe = {self.severe:g} gets "
+                f"no worse. Give both {order}."
+            )
         finite_number(self.amplitude, "the amplitude of a sway [m]")
         finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
 

@@ -324,7 +324,8 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
                 click.echo(f"    {row.controller}: {_value(row, factor)}")
     click.echo(f"\nranking over {len(plan)} cases (mean rank; shared within the resolution)")
     for (trial, score), rows in rank_controllers(table).groupby(["trial", "score"], sort=False):
-        order = ", ".join(map(_ranked, rows.itertuples()))
+        alike = rows["settings"].nunique() == 1
+        order = ", ".join(_ranked(row, alike) for row in rows.itertuples())
         click.echo(f"  {trial}, {str(score).replace('_', ' ')}: {order}")
     found = agreement(table)
     if not len(found):
@@ -343,9 +344,10 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
     click.echo(f"  {CAVEAT}")
 
 
-def _ranked(row: Any) -> str:
-    lost = f" ({row.failures} of {row.settings} not measured)" if row.failures else ""
-    return f"{row.controller} {row.mean_rank:.2g}{lost}"
+def _ranked(row: Any, alike: bool) -> str:
+    said = [] if alike else [f"over {row.settings} setting{'s' * (row.settings != 1)}"]
+    said += [f"{row.failures} of {row.settings} not measured"] if row.failures else []
+    return f"{row.controller} {row.mean_rank:.2g}" + (f" ({', '.join(said)})" if said else "")
 
 
 _VERBS = {"slipped": "slips", "left the ground": "lifts"}

@@ -11,6 +11,7 @@ from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel,
 from copsense.plots import plot_sway_cop, plot_sway_hip_roll, plot_sway_limits, plot_sway_load
 from copsense.plots.style import Figure
 from copsense.report.figure import ReportFigure
+from copsense.report.words import limit_words
 
 _SECTION = "closed-loop"
 
@@ -91,8 +92,10 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             _SECTION,
             f"Within limits, ±{reach:g} mm.",
             "With inequalities in the controller the CoM goes from over one foot to over the "
-            "other: each CoP stops short of its edge, and the other foot carries the rest. Dotted: "
-            "the edges level with the foot's origin; a CoP that moves fore or aft has others.",
+            "other: each CoP stops short of its edge, and the other foot carries the rest. "
+            f"Limits: {limit_words(sway.limits)}; nearer to the edge a mesh's rounded sole rolls. "
+            "Dotted: the edges level with the foot's origin; a CoP that moves fore or aft has "
+            "others.",
             "CoP y of both feet against time, one panel per criterion, flat near the soles' edges.",
             lambda: plot_sway_limits(sway.limited),
             shape="wide",

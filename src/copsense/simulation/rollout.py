@@ -104,7 +104,7 @@ def _run(
     ground = _alterable(simulator, "a change of friction") if changes else None
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
-    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance)
+    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance, dt)
     watch, recorder = Watch(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
@@ -231,21 +231,21 @@ class _Sensors:
 class _Pushes:
     """Pushes as a generalised force."""
 
-    def __init__(self, scenario: Scenario, stance: Stance) -> None:
-        self._pushes, self._model = scenario.pushes, stance.robot.model
+    def __init__(self, scenario: Scenario, stance: Stance, step: float) -> None:
+        self._step, self._pushes, self._model = step, scenario.pushes, stance.robot.model
         self._data = self._model.createData()
 
     def at(self, now: Snapshot) -> np.ndarray | None:
-        active = [push for push in self._pushes if push.acts(now.time + 1e-9)]
-        if not active:
+        shares = [push.share(now.time, self._step) for push in self._pushes]
+        if not any(shares):
             return None
         total = np.zeros(self._model.nv)
         pin.computeJointJacobians(self._model, self._data, now.q)
         pin.updateFramePlacements(self._model, self._data)
-        for push in active:
+        for push, share in zip(self._pushes, shares, strict=True):
             frame = self._model.getFrameId(push.frame)
             J = pin.getFrameJacobian(
                 self._model, self._data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             )
-            total += J[:3].T @ np.array(push.force)
+            total += share * (J[:3].T @ np.array(push.force))
         return total
