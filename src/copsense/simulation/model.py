@@ -19,6 +19,9 @@ from copsense.simulation.supports import support_points
 from copsense.stance import Stance
 
 _POINT = 1e-4  # m: radius of the ball at each support point
+# m: how deep each starts in the ground. A contact that only touches is not felt in the first step,
+# and the torques meant for a foot that is held spin one that is not.
+_PRESSED = 1e-6
 _HINGES = ("JointModelR",)
 _SLIDES = ("JointModelP",)
 
@@ -116,7 +119,7 @@ def _add_contact(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0.0, 0.0, 1.0],
         # A point's ball is centred on the point; a sole's balls stand on the sole.
-        pos=world.translation - (_POINT * up if point else 0.0),
+        pos=world.translation + (_PRESSED - (_POINT if point else 0.0)) * up,
         quat=_wxyz(world),
         contype=0,
         conaffinity=0,
