@@ -153,6 +153,7 @@ def test_a_scenario_that_does_not_fit_the_robot(scenario, error):
         lambda: Scenario(0.0),
         lambda: Scenario(np.nan),
         lambda: Scenario(1e9),
+        lambda: Scenario(seed=-3),
         lambda: Scenario(1.0, control_period=0.0),
         lambda: Sine(0.01, 0.0),
         lambda: Sine(np.inf, 1.0),
