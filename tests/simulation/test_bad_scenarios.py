@@ -117,6 +117,24 @@ def test_a_controller_that_raises(kind):
         rollout(Statue(icub()), broken, Scenario(0.1))
 
 
+def test_a_controller_cannot_change_what_it_sees():
+    def meddling(observation):
+        observation.q[:] = 0.0
+        return np.zeros(N)
+
+    with pytest.raises(ControllerError, match="read-only"):
+        rollout(Statue(icub()), meddling, Scenario(0.1))
+
+
+def test_a_run_that_is_told_to_stop_keeps_what_it_has():
+    asked = iter([False] * 20 + [True])
+    recording = rollout(Statue(icub()), zero, Scenario(1.0), stop=lambda: next(asked))
+    assert recording.attrs["end_kind"] == "stopped"
+    # Asked from the second period on: before there is nothing to keep.
+    assert recording.attrs["end_time"] == pytest.approx(0.021)
+    assert len(recording["time"]) == 5
+
+
 def test_a_controller_as_a_class():
     class Mine:
         name = "mine"

@@ -169,7 +169,7 @@ class ControllerChoice:
         criterion_named(self.criterion, self.characteristic_length)
         if self.gains not in _GAINS:
             raise UnknownNameError("set of gains", self.gains, _GAINS)
-        if self.source and not all(self.source.partition(":")):
+        if self.source and not all(self.source.rpartition(":")):
             raise InvalidInputError(
                 f"the controller {self.source!r} is not understood. Give MODULE:ATTRIBUTE, a "
                 "callable stance -> controller."

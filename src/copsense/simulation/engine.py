@@ -279,6 +279,11 @@ def load_mujoco() -> Any:
         import mujoco
     except ImportError:
         raise MissingExtraError("mujoco", "sim", "simulating a robot") from None
+    except RuntimeError as error:  # it refuses values of MUJOCO_GL
+        raise InvalidInputError(
+            f"MuJoCo does not load: {error}. Leave the variable MUJOCO_GL out, or give egl, osmesa "
+            "or glfw."
+        ) from None
     return mujoco
 
 

@@ -33,7 +33,8 @@ class StaticPrediction:
         excursion: how far from the start the path's coordinate may go until a contact's CoP reaches
             an edge, its load is gone, or its force leaves the friction cone [m]; infinite where
             none does on this path.
-        contact: the contact that tips, lifts or slips first, or nothing.
+        contact: the contact that does so first, or nothing.
+        how: ``"tips"``, ``"lifts"`` or ``"slips"``, or nothing.
         first_order: the same from wrenches and slopes at the start alone [m].
     """
 
@@ -42,6 +43,7 @@ class StaticPrediction:
     joints: Float[np.ndarray, "N n"]
     excursion: float
     contact: str
+    how: str
     first_order: float
 
     def attach(self, dataset: xr.Dataset) -> xr.Dataset:
@@ -62,6 +64,7 @@ class StaticPrediction:
         ).assign_attrs(
             static_excursion=self.excursion,
             static_contact=self.contact,
+            static_how=self.how,
             static_first_order=self.first_order,
         )
 
@@ -105,9 +108,10 @@ def predict(
     middle = int(np.argmin(np.abs(values)))
     order = np.arange(middle, len(values)) if side > 0 else np.arange(middle, -1, -1)
     travel = side * values[order]  # the path's postures need not include the very start
-    excursion, contact, first_order = np.inf, "", np.inf
+    excursion, contact, how, first_order = np.inf, "", "", np.inf
     for k, distances in enumerate(margins):
-        for edge in distances[order].T:
+        ways = ["tips"] * (distances.shape[1] - 2) + ["lifts", "slips"]
+        for way, edge in zip(ways, distances[order].T, strict=True):
             if len(travel) > 1 and edge[1] < edge[0] - 1e-12:
                 part = edge[0] / (edge[0] - edge[1])
                 first_order = min(first_order, travel[0] + part * (travel[1] - travel[0]))
@@ -119,12 +123,12 @@ def predict(
                     part = edge[i - 1] / (edge[i - 1] - edge[i])
                     at = float(travel[i - 1] + part * (travel[i] - travel[i - 1]))
                 if at < excursion:
-                    excursion, contact = at, path.stances[0].contact_names[k]
+                    excursion, contact, how = at, path.stances[0].contact_names[k], way
     robot = path.stances[0].robot
     joints = np.array(
         [[robot.joint_position(s.q, joint) for joint in robot.joint_names] for s in path.stances]
     )
-    return StaticPrediction(values, cops, joints, excursion, contact, float(first_order))
+    return StaticPrediction(values, cops, joints, excursion, contact, how, float(first_order))
 
 
 def predict_lean(

@@ -42,6 +42,7 @@ def rollout(
     record_period: float = 5e-3,
     thresholds: Thresholds | None = None,
     progress: Callable[[int], object] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> xr.Dataset:
     """Run a scenario in closed loop.
 
@@ -54,6 +55,7 @@ def rollout(
         record_period: time between two rows of the record [s], rounded to control periods.
         thresholds: what counts as a tip or a fall.
         progress: called with the number of control periods done since the last call.
+        stop: asked before every control period; true ends the run.
 
     Returns:
         A dataset over ``time`` with centre of mass, wrenches (measured and commanded), CoPs,
@@ -77,6 +79,7 @@ def rollout(
             record_period,
             thresholds or Thresholds(),
             progress,
+            stop,
         )
 
 
@@ -88,6 +91,7 @@ def _run(
     record_period: float,
     thresholds: Thresholds,
     progress: Callable[[int], object] | None,
+    stop: Callable[[], bool] | None,
 ) -> xr.Dataset:
     believed, dt = simulator.stance, simulator.time_step
     name, n = controller_name(controller), len(believed.robot.torque_names)
@@ -117,11 +121,16 @@ def _run(
     end = Event("completed", scenario.duration, "completed")
     for number in range(count):
         time = number * scenario.control_period
+        if stop and len(recorder) and stop():
+            end = Event("stopped", time, "stopped")
+            break
         target = reference.at(time)
         while ground is not None and changes and changes[0].start <= time + 1e-9:
             change = changes.popleft()
             ground.set_friction(change.friction, change.contact)
         q, v = sensors.read(now)
+        for seen in (q, v, now.wrenches):  # the controller's to read, not to change
+            seen.setflags(write=False)
         try:
             observation = Observation(time, q, v, target, now.wrenches)
             command = ask(controller, observation, n)
