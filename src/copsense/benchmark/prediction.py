@@ -18,7 +18,7 @@ from copsense.equilibrium import solve_equilibrium
 from copsense.limits import Limits
 from copsense.sensitivity import cop_sensitivity
 from copsense.simulation import PhysicsSettings
-from copsense.simulation.prediction import force_gaps, predict
+from copsense.simulation.prediction import farther_side, force_gaps, predict
 from copsense.stance import Stance
 
 _AFTER = 1.0  # s: the law has answered a push by then
@@ -139,7 +139,7 @@ def statics(
         straight = np.array([0.0, 0.0, force_rate[2]])
         gap_rates.append(force_gaps(contact, straight[None], friction)[0] - [0.0, sideways])
     left = np.concatenate([distance, *gaps])
-    outwards = np.concatenate([rate, *gap_rates]) * (1.0 if high >= -low else -1.0)
+    outwards = np.concatenate([rate, *gap_rates]) * farther_side(reference.signal)
     closing = outwards < -1e-12
     travel = (left[closing] / -outwards[closing]).min() if closing.any() else np.inf
     return Statics(

@@ -13,7 +13,7 @@ import xarray as xr
 from jaxtyping import Float
 
 from copsense.contact import Contact, half_planes
-from copsense.controllers.target import PathReference, Ramp, lateral_reference
+from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.equilibrium import solve_equilibrium
@@ -103,8 +103,7 @@ def predict(
             zip(path.stances[0].contacts, forces.swapaxes(0, 1), strict=True)
         )
     ]
-    low, high = reference.signal.extent
-    side = 1.0 if high >= -low else -1.0
+    side = farther_side(reference.signal)
     middle = int(np.argmin(np.abs(values)))
     order = np.arange(middle, len(values)) if side > 0 else np.arange(middle, -1, -1)
     travel = side * values[order]  # the path's postures need not include the very start
@@ -136,6 +135,14 @@ def predict_lean(
 ) -> StaticPrediction:
     """The static prediction of a lateral lean up to `reach` [m]; its sign says to which side."""
     return predict(lateral_reference(stance, Ramp(reach)), criterion, limits)
+
+
+def farther_side(signal: Signal) -> float:
+    """To which side a signal goes farther, 1 or -1; as a sine goes as far to both, first."""
+    low, high = signal.extent
+    if high == -low:
+        return -1.0 if signal.at(0.0)[1] < 0 else 1.0
+    return 1.0 if high > -low else -1.0
 
 
 def force_gaps(
