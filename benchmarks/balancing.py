@@ -293,7 +293,7 @@ def speed() -> list[str]:
     seen = Observation(0.0, stance.q, np.zeros(stance.robot.model.nv), target, np.zeros((2, 6)))
     criterion = copsense.minimum_torque()
     for what, controller in (
-        ("controller, minimum wrench", bench.controller),
+        ("controller, minimum wrench", bench.make_controller()),
         ("controller, minimum torque", BalancingController(stance, criterion)),
         (
             "controller, minimum torque, limits",

@@ -8,6 +8,7 @@ from scipy import stats
 
 from copsense.benchmark import fisher_interval, wilson_interval
 from copsense.benchmark.intervals import bisect
+from copsense.errors import InvalidInputError
 
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 5), (1, 7), (10, 20), (19, 20), (20, 20)])
@@ -48,6 +49,11 @@ def test_a_bisection_brackets_where_it_breaks(mild, severe):
         assert high - low <= step * 1.0001
         assert found.runs == len(asked) <= 2 + math.ceil(math.log2(abs(severe - mild) / step))
         assert len(set(asked)) == len(asked)
+
+
+def test_a_bisection_is_no_finer_than_a_millionth():
+    with pytest.raises(InvalidInputError, match="finer than any"):
+        bisect(lambda value: value < 0.5, 0.0, 1.0, 1e-300)
 
 
 def test_a_bisection_says_where_nothing_breaks_and_where_everything_does():

@@ -1,5 +1,7 @@
 """What a table says: ranks as far as the scores can tell, and agreement with its interval."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -43,6 +45,17 @@ def test_a_bound_counts_as_far_as_it_goes_and_a_failure_comes_last():
     assert found == {"a": 1, "b": 3, "c": 1, "d": 4}
 
 
+def test_where_everything_failed_nobody_wins():
+    rows = [row(name, np.nan, status="failed", posture="p") for name in "ab"]
+    rows += [row(name, np.nan, status="none", posture="q") for name in "ab"]
+    assert rank_controllers(pd.DataFrame(rows)).empty
+    rows += [row("a", 1.0, posture="r"), row("b", np.nan, status="tipped", posture="r")]
+    found = rank_controllers(pd.DataFrame(rows)).set_index("controller")
+    assert found["wins"].to_dict() == {"a": 1, "b": 0}
+    assert found["failures"].to_dict() == {"a": 0, "b": 1}
+    assert found["settings"].to_dict() == {"a": 1, "b": 1}
+
+
 def test_ranks_are_taken_in_each_setting_and_averaged():
     rows = [
         row(name, value, posture=posture)
@@ -75,6 +88,14 @@ def test_agreement_is_that_of_another_implementation():
     assert found["largest_error"] == pytest.approx(np.abs(value - predicted).max())
     assert found["correlation"] == pytest.approx(expected.statistic)
     assert (found["low"], found["high"]) == pytest.approx(tuple(interval))
+
+
+def test_a_controller_of_ones_own_follows_a_law_of_its_own():
+    rows = [row("a", float(i), predicted=float(i)) for i in range(4)]
+    own = json.dumps({"controller": {"source": "mine:make"}})
+    rows.append(row("mine", 9.0, predicted=1.0, parameters=own))
+    found = agreement(pd.DataFrame(rows)).iloc[0]
+    assert (found["cases"], found["largest_error"]) == (4, 0.0)
 
 
 def test_few_cases_have_no_correlation():

@@ -13,19 +13,24 @@ from narrow import C1, C2, LEAN, ROBOT, STRAIGHT, one, plan
 
 import copsense
 from copsense.benchmark import (
+    Breaking,
     Case,
     Conditions,
     ControllerChoice,
+    Falls,
     Lean,
     PostureChoice,
+    PushToTip,
     Rest,
     RobotChoice,
+    Sway,
     load_benchmark,
     make_plan,
     run_benchmark,
     run_case,
 )
 from copsense.errors import InvalidInputError, OutputError
+from copsense.limits import Limits
 from copsense.simulation import Motors
 
 SOURCE = Path(copsense.__file__).parents[1]
@@ -155,6 +160,41 @@ def test_a_run_that_fails_is_a_row_with_its_reason(case, says):
     assert says in score.reason
 
 
+TRIALS = (
+    LEAN,
+    PushToTip(largest=1.0, resolution=0.5),
+    Breaking("delay", mild=0.0, severe=0.02, step=0.01, amplitude=2e-3),
+    Falls(repeats=1),
+    Rest(0.1),
+    Sway(2e-3, 1.0),
+)
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: type(trial).__name__)
+def test_a_controller_that_fails_on_the_way_has_measured_nothing(trial, tmp_path, monkeypatch):
+    (tmp_path / "late_controllers.py").write_text(LATE)
+    monkeypatch.chdir(tmp_path)
+    limits = Limits(friction=0.5) if isinstance(trial, Falls) else None
+    late = ControllerChoice("minimum-wrench", source="late_controllers:Late", limits=limits)
+    scores = run_case(one(trial, late))
+    assert [s.status for s in scores] == ["failed"] * len(trial.scores)
+    assert all("no idea at 0.05" in s.reason for s in scores)
+
+
+LATE = """
+from copsense.controllers import BalancingController
+from copsense.criterion import minimum_wrench
+
+class Late(BalancingController):
+    def __init__(self, stance):
+        super().__init__(stance, minimum_wrench(1.0))
+
+    def __call__(self, observation):
+        if observation.time > 0.0495:
+            raise RuntimeError(f"no idea at {observation.time:.2f}")
+        return super().__call__(observation)
+"""
+
 OWN = """
 import os
 from copsense.controllers import BalancingController
@@ -187,6 +227,69 @@ def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, mon
     assert table.loc["good", "value"] == run_case(one(LEAN))[0].value
 
 
+FORGETFUL = (
+    OWN
+    + """
+class Tired:
+    \"\"\"Balances for twelve hundred calls, and then no more.\"\"\"
+
+    def __init__(self, stance):
+        self.inner, self.calls, self.n = good(stance), 0, len(stance.robot.torque_names)
+
+    def __call__(self, observation):
+        self.calls += 1
+        return self.inner(observation) if self.calls < 1300 else [0.0] * self.n
+"""
+)
+
+
+def test_a_controller_that_remembers_is_made_anew_for_each_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tired_controllers.py").write_text(FORGETFUL)
+    push = PushToTip(largest=1.0, resolution=0.1)
+    tired = ControllerChoice("minimum-wrench", source="tired_controllers:Tired")
+    (found,), (usual,) = (run_case(one(push, choice)) for choice in (tired, C1))
+    assert (found.low, found.high) == (usual.low, usual.high)
+    assert found.runs > 2
+
+
+def test_new_code_of_a_controller_is_another_parameter(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    module, table = tmp_path / "changing_controllers.py", tmp_path / "table.csv"
+    mine = ControllerChoice("minimum-wrench", source="changing_controllers:good", name="mine")
+    module.write_text(OWN)
+    with monkeypatch.context() as patched:
+        patched.setattr("copsense.benchmark.run.score_trial", lambda bench: 1 / 0)
+        run_benchmark(plan([LEAN], [mine, C2]), table)
+    # What failed is run again, and its code may be another by now.
+    module.write_text(OWN + "\n# mended")
+    first = run_benchmark(plan([LEAN], [mine, C2]), table)
+    assert list(first["status"]) == ["measured"] * 2
+    module.write_text(OWN + "\n# changed")
+    with pytest.raises(OutputError, match=r"controller\.content was"):
+        run_benchmark(plan([LEAN], [mine, C2]), table)
+
+
+def test_a_case_of_which_rows_are_missing_is_run_again(whole, tmp_path):
+    path = tmp_path / "table.csv"
+    lines = whole[0].read_text().splitlines(keepends=True)
+    path.write_text("".join(line for line in lines if ",cop_error," not in line))
+    run_benchmark(plan(), path)
+    assert path.read_text() == whole[0].read_text()
+
+
+@pytest.mark.parametrize("jobs", [None, 1])
+def test_a_controller_that_leaves_is_a_row_too(jobs, tmp_path, monkeypatch):
+    (tmp_path / "leaving_controllers.py").write_text(
+        "def leave(stance):\n    raise SystemExit(0)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    leaving = ControllerChoice("minimum-wrench", source="leaving_controllers:leave", name="leave")
+    table = run_benchmark(plan([LEAN], [leaving, C2]), jobs=jobs)
+    assert list(table["status"]) == ["failed", "measured"]
+    assert "SystemExit" in table["reason"][0]
+
+
 def test_conditions_are_those_of_a_scenario():
     slow = Conditions("slow", {"motors": Motors(delay=0.004)})
     (ideal,), (late,) = (run_case(one(LEAN, conditions=[c])) for c in (Conditions(), slow))
@@ -197,11 +300,13 @@ def test_conditions_are_those_of_a_scenario():
         Conditions("stormy", {"wind": 3.0})
 
 
-def test_a_key_is_that_of_the_parameters():
+def test_a_key_is_that_of_the_parameters(monkeypatch):
     again = one(Lean(0.015, 0.02))
     assert again.key == one(LEAN).key
     assert one(Lean(0.015, 0.021)).key != again.key
     assert one(LEAN, C2).key != again.key
+    monkeypatch.setattr("copsense.benchmark.cases._software", lambda: {"mujoco": "9.9"})
+    assert one(LEAN).key != again.key
 
 
 def test_plans_that_mean_nothing_are_refused(tmp_path):

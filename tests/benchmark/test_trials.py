@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import typing
 
 import numpy as np
 import pytest
@@ -12,20 +13,23 @@ from copsense.benchmark import (
     Breaking,
     Falls,
     Lean,
+    PostureChoice,
     PushToTip,
     Rest,
     RobotChoice,
     Sway,
+    make_plan,
     predict_impulse,
     run_case,
 )
 from copsense.benchmark.bench import Bench
 from copsense.benchmark.prediction import statics
 from copsense.benchmark.trials import SCORES, trial_named
-from copsense.controllers import Ramp, lateral_reference
+from copsense.controllers import Ramp, Sine, lateral_reference
 from copsense.limits import Limits
+from copsense.motion import lateral_sweep
 from copsense.sensitivity import cop_sensitivity
-from copsense.simulation.prediction import predict
+from copsense.simulation.prediction import force_gaps, predict
 
 LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
 WITHIN = dataclasses.replace(C2, limits=LIMITS, name="")
@@ -53,6 +57,11 @@ def test_the_paper_s_sway_tells_the_criteria_apart():
         found["smallest_margin"].predicted, abs=5e-4
     )
     assert found["com_error"].value < 1e-4
+    case = one(Sway(0.039, 0.05, 0.26), C2, robot=FULL)
+    bench = Bench(case)
+    run = bench.run(bench.reference(Sine(0.039, 0.05)), 5.2).sel(time=slice(1.0, None))
+    error = (run["com"] - run["com_target"]).sel(com_axis="y").values
+    assert found["com_error"].value == np.sqrt(np.mean(error**2))
     for name in ("torque_norm", "torque_peak"):
         assert found[name].value == pytest.approx(found[name].predicted, rel=0.05)
 
@@ -111,13 +120,25 @@ def test_a_breaking_point_lies_between_survival_and_failure():
     assert found.predicted == pytest.approx(found.first_order, rel=0.1)
 
 
-def test_falls_are_a_seeded_rate_with_its_interval():
+class _Ended:
+    attrs: typing.ClassVar = {"end_kind": "completed"}
+
+
+def test_falls_are_a_seeded_rate_with_its_interval(monkeypatch):
     gentle = Falls(0.02, 2, watch=0.2)
     (once,), (again,) = (run_case(one(gentle, WITHIN, FULL)) for _ in range(2))
     assert once == again
     assert (once.value, once.low) == (0.0, 0.0)
     assert once.high == pytest.approx(copsense.benchmark.wilson_interval(0, 2)[1])
     assert once.runs == 2
+    draws = []
+    with monkeypatch.context() as patched:
+        patched.setattr(Bench, "run", lambda *a, **k: draws.append(k) or _Ended())
+        for seed in (0, 0, 1):
+            run_case(one(Falls(0.02, 2, seed=seed), WITHIN, FULL))
+    first, second, again, _, other, _ = [(d["push"], d["seed"]) for d in draws]
+    assert first == again
+    assert len({str(draw) for draw in (first, second, other)}) == 3
     hard = run_case(one(Falls(1.5, 2, watch=1.5), WITHIN, FULL))[0]
     assert hard.value == 1.0
     with pytest.raises(copsense.CopsenseError, match="limits"):
@@ -125,9 +146,54 @@ def test_falls_are_a_seeded_rate_with_its_interval():
 
 
 def test_a_robot_without_soles_has_no_margin():
+    (case,) = make_plan([RobotChoice("solo12")], [PostureChoice()], [C2], [Sway(0.002, 2.0)])
+    margin, *others = run_case(case)
+    assert (margin.status, margin.reason) == ("none", "no contact has a sole's edge")
+    assert [score.status for score in others] == ["measured"] * 3
+
+
+def test_the_knees_of_a_quadruped_are_not_known():
     found = scores(Sway(0.002, 2.0), C2, robot=RobotChoice("solo12"))
-    # Its posture is asked for by knees, and a quadruped's are not known.
     assert "knees" in found["smallest_margin"].reason
+
+
+@pytest.mark.parametrize(("choice", "how"), [(C1, "left the ground"), (C2, "slipped")])
+def test_a_point_lifts_or_slips_where_the_statics_say(choice, how):
+    stance = copsense.load_stance("solo12")
+    found = statics(lateral_reference(stance, Ramp(0.15)), choice.law)
+    forces = []
+    for there in lateral_sweep(stance, 0.0, 0.99 * found.excursion, 3).stances:
+        wrenches = copsense.solve_equilibrium(there, choice.law).wrenches
+        forces.append(force_gaps(there.contacts[0], wrenches[:, :3], 1.0))
+    assert np.all(np.array(forces) > 0)
+    assert (found.excursion < 0.12) == (how == "slipped")
+    (case,) = make_plan([RobotChoice("solo12")], [PostureChoice()], [choice], [Lean(speed=0.03)])
+    (run,) = run_case(case)
+    assert how in run.reason
+    # A slip is seen when it is 20 mm, a lift when it is 2 mm.
+    assert -1e-3 < run.value - found.excursion < 1e-2
+    assert run.predicted == pytest.approx(found.excursion, rel=1e-4)  # on another path's grid
+
+
+def test_the_first_order_of_a_slip_is_that_of_the_path():
+    own = copsense.load_stance("go2").contacts
+    free = [dataclasses.replace(contact, friction=None) for contact in own]
+    stance = copsense.load_stance("go2", contacts=free)
+    reference = lateral_reference(stance, Ramp(0.13))
+    found, near = statics(reference, C2.law, None, 0.7), predict(reference, C2.law, None, 0.7)
+    assert found.contact == near.contact
+    # That of the statics is the derivative, the other a difference over 2 mm.
+    assert found.first_order == pytest.approx(near.first_order, rel=0.01)
+    bare = statics(reference, C2.law, None, 1e9)
+    assert bare.excursion > found.excursion
+
+
+def test_a_sway_that_is_cut_short_is_predicted_as_far_as_it_goes():
+    # A tenth of a period: the CoM ends at 0.59 of the amplitude.
+    short = scores(Sway(0.01, 0.05, 0.1), robot=FULL)["smallest_margin"]
+    whole = scores(Sway(0.01 * math.sin(0.2 * math.pi), 0.2, 0.25), robot=FULL)["smallest_margin"]
+    assert short.predicted == pytest.approx(whole.predicted, rel=1e-6)
+    assert short.value == pytest.approx(short.predicted, abs=5e-4)
 
 
 def test_the_first_order_is_the_sensitivity_s(stance):
@@ -173,6 +239,10 @@ def test_the_legs_are_between_the_base_and_the_contacts():
         ("lean", {"side": "up"}, "up"),
         ("lean", {"parameter": "delay"}, "parameter"),
         ("push", {"resolution": -1}, "resolution"),
+        ("delay", {"mild": 0.05, "severe": 0.0}, "gets no worse"),
+        ("delay", {"mild": -1.0}, "0 or more"),
+        ("bandwidth", {"severe": -5.0}, "over 0"),
+        ("bandwidth", {"severe": 60.0}, "severe under mild"),
         ("falls", {"repeats": 0}, "repeats"),
         ("delay", {"step": 0}, "step"),
     ],

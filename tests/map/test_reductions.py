@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import copsense
-from copsense.maps.reduction import WORST, fold, percentiles, reduce_chunk
+from copsense.maps.reduction import WORST, Percentiles, fold, reduce_chunk
 
 LEVELS = (0.0, 1.0, 25.0, 50.0, 99.0, 100.0)
 
@@ -22,13 +22,23 @@ def test_percentiles_are_exact_order_statistics(kind):
         "one": np.array([3.5]),
     }[kind].astype(np.float32)
     chunks = np.array_split(values, 7)
-    found = percentiles(lambda: iter(chunks), LEVELS)
+    found = _percentiles(chunks)
     known = values[~np.isnan(values)]
     assert np.array_equal(found, np.percentile(known, LEVELS, method="inverted_cdf"))
 
 
 def test_percentiles_of_nothing_are_not_a_number():
-    assert np.isnan(percentiles(lambda: iter([np.zeros(0, np.float32)]), LEVELS)).all()
+    assert np.isnan(_percentiles([np.zeros(0, np.float32)])).all()
+    assert np.isnan(_percentiles([])).all()
+
+
+def _percentiles(chunks):
+    """Of one column, beside another that must not disturb it."""
+    shares = Percentiles(2, LEVELS)
+    for take in (shares.count, shares.refine):
+        for values in chunks:
+            take(np.stack([values, np.arange(len(values), dtype=np.float32)], axis=1))
+    return shares.found()[0]
 
 
 def _chunk(rng, count):
@@ -49,9 +59,7 @@ def test_parts_fold_to_the_whole_in_any_order():
     parts = [reduce_chunk({n: a[i:j] for n, a in whole.items()}, i) for i, j in spans]
     expected = reduce_chunk(whole, 0)
     for order in (range(5), (4, 2, 0, 3, 1)):
-        total = parts[order[0]]
-        for i in list(order)[1:]:
-            total = fold(total, parts[i])
+        total = fold([fold([parts[i] for i in order[:2]]), *(parts[i] for i in order[2:])])
         for name in ("counts", "worst", "values"):
             assert getattr(total, name).tobytes() == getattr(expected, name).tobytes(), name
 

@@ -5,8 +5,8 @@ import pytest
 from standing import C1, C2, icub, simulator
 
 import copsense
-from copsense.controllers import BalancingController
-from copsense.simulation import MujocoSimulator, PhysicsSettings, Scenario, rollout
+from copsense.controllers import BalancingController, Sine
+from copsense.simulation import MujocoSimulator, PhysicsSettings, Push, Scenario, rollout
 
 MIXED = copsense.mixed((C1, 1e-2), (C2, 1.0))
 WEIGHTED = copsense.weighted_torque("inverse inertia")
@@ -47,6 +47,29 @@ def test_the_closed_loop_at_rest_has_the_static_wrenches(criterion):
     assert drift[:2].max() < 1e-6
     assert drift[2] < 5e-5
     assert np.abs(last["joint_velocity"]).max() < 1e-3
+
+
+@pytest.mark.parametrize("limits", [None, copsense.Limits(friction=0.5, cop_margin=0.002)])
+def test_one_foot_has_no_choice_and_stands(limits):
+    stance = copsense.load_stance("icub", contacts=["l_sole"])
+    controller = BalancingController(stance, C2, limits=limits)
+    # With limits the push is more than the sole can take at once: the rate gives way.
+    push = Push((0.0, 5.0 if limits is None else 20.0, 0.0), 0.1, 0.1)
+    recording = rollout(MujocoSimulator(stance), controller, Scenario(1.0, pushes=(push,)))
+    assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
+    assert float(recording["margin"].min()) > 1e-3
+    static = copsense.solve_equilibrium(stance, C2).wrenches
+    command = at_rest(stance, controller)
+    assert np.abs(command.wrenches - static).max() < 1e-8 * stance.robot.weight
+
+
+def test_light_feet_are_held_from_the_first_step():
+    # The reference starts at full speed; an ankle of the G1 has next to no inertia of its own.
+    stance = copsense.load_stance("g1")
+    simulator, controller = MujocoSimulator(stance), BalancingController(stance, C2)
+    recording = rollout(simulator, controller, Scenario(0.05, Sine(0.02, 0.2)), record_period=1e-3)
+    assert recording["wrench"].sel(component="fz").values[0].min() > 0.2 * stance.robot.weight
+    assert np.degrees(recording["tilt"].max()) < 0.1
 
 
 def test_wrenches_are_the_engines_own():

@@ -108,12 +108,31 @@ def test_a_controller_that_answers_nonsense(answer, says):
     assert "at 0.020 s" in recording.attrs["end_reason"]
 
 
-def test_a_controller_that_raises():
+@pytest.mark.parametrize("kind", [RuntimeError, SystemExit])
+def test_a_controller_that_raises(kind):
     def broken(observation):
-        raise RuntimeError("out of ideas")
+        raise kind("out of ideas")
 
     with pytest.raises(ControllerError, match=r"'broken' at 0.000 s raised.*out of ideas"):
         rollout(Statue(icub()), broken, Scenario(0.1))
+
+
+def test_a_controller_cannot_change_what_it_sees():
+    def meddling(observation):
+        observation.q[:] = 0.0
+        return np.zeros(N)
+
+    with pytest.raises(ControllerError, match="read-only"):
+        rollout(Statue(icub()), meddling, Scenario(0.1))
+
+
+def test_a_run_that_is_told_to_stop_keeps_what_it_has():
+    asked = iter([False] * 20 + [True])
+    recording = rollout(Statue(icub()), zero, Scenario(1.0), stop=lambda: next(asked))
+    assert recording.attrs["end_kind"] == "stopped"
+    # Asked from the second period on: before there is nothing to keep.
+    assert recording.attrs["end_time"] == pytest.approx(0.021)
+    assert len(recording["time"]) == 5
 
 
 def test_a_controller_as_a_class():
@@ -152,6 +171,7 @@ def test_a_scenario_that_does_not_fit_the_robot(scenario, error):
         lambda: Scenario(0.0),
         lambda: Scenario(np.nan),
         lambda: Scenario(1e9),
+        lambda: Scenario(seed=-3),
         lambda: Scenario(1.0, control_period=0.0),
         lambda: Sine(0.01, 0.0),
         lambda: Sine(np.inf, 1.0),

@@ -1,12 +1,15 @@
 """``copsense balance`` answers, writes and refuses."""
 
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
+import xarray as xr
 
 from copsense.storage import load_recording
 
@@ -77,6 +80,59 @@ def test_disturbances_from_the_command():
     )  # fmt: skip
     assert answer.code == 0, answer.err
     assert answer.json["end"]["kind"] == "completed"
+
+
+REST = """
+from copsense.controllers import BalancingController
+from copsense.criterion import minimum_torque
+
+class Rest(BalancingController):
+    def __init__(self, stance):
+        super().__init__(stance, minimum_torque())
+
+"""
+
+
+def test_ctrl_c_keeps_what_was_recorded(tmp_path):
+    path, began, module = tmp_path / "run.nc", tmp_path / "began", tmp_path / "at_rest.py"
+    module.write_text(
+        "from pathlib import Path\n"
+        + REST
+        + "    def __call__(self, observation):\n"
+        + f"        Path({str(began)!r}).touch()\n"
+        + "        return super().__call__(observation)\n"
+    )
+    code = "from copsense.cli import main; main()"
+    command = [sys.executable, "-c", code, "balance", "icub", "--controller", f"{module}:Rest"]
+    running = subprocess.Popen(
+        [*command, "--duration", "500", "--output", path],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    for _ in range(1200):
+        if began.exists():
+            break
+        time.sleep(0.1)
+    time.sleep(0.3)
+    running.send_signal(signal.SIGINT)
+    out, err = running.communicate(timeout=60)
+    assert running.returncode == 130, err
+    assert "stopped" in out
+    recording = xr.load_dataset(path)
+    assert recording.attrs["end_kind"] == "stopped"
+    assert 0 < float(recording["time"][-1]) <= recording.attrs["end_time"] < 400
+
+
+def test_a_point_that_slips_is_said_to(tmp_path):
+    answer = copsense("balance", "solo12", "--reference", "ramp:0.15:0.1", "--until", "tip")
+    assert "FOOT slipped by" in answer.out
+    assert "FOOT slips at 116.7 mm" in answer.out
+
+
+def test_a_controller_from_a_file_elsewhere(tmp_path):
+    (tmp_path / "at_rest.py").write_text(REST)
+    source = f"{tmp_path / 'at_rest.py'}:Rest"
+    answer = copsense("balance", "icub", "--duration", 0.1, "--controller", source)
+    assert answer.code == 0, answer.err
 
 
 def test_a_run_is_filmed(tmp_path):

@@ -154,6 +154,25 @@ def test_stiff_gains_stand_odometry_that_begins_when_the_robot_stands(foot):
         assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
 
 
+@pytest.mark.parametrize("duration", [1e-4, 1e-3, 1.5e-3, 0.0123, 0.05])
+def test_a_push_gives_its_impulse_whatever_the_steps(duration):
+    class Pushed(Statue):
+        given = 0.0
+
+        def step(self, torques, external=None):
+            self.given += 0.0 if external is None else np.linalg.norm(external[:3]) * self.time_step
+            return super().step(torques, external)
+
+    pushed = Pushed(icub())
+    push = Push((0.0, 2.0 / duration, 0.0), 0.1 + duration / 3, duration)
+    rollout(
+        pushed,
+        lambda observation: np.zeros(len(icub().robot.torque_names)),
+        Scenario(0.2, pushes=(push,)),
+    )
+    assert pushed.given == pytest.approx(2.0, rel=1e-6)
+
+
 def test_odometry_hands_over_once_and_without_a_jump():
     stance = icub()
     odometry = FootOdometry(stance, "loaded")

@@ -148,6 +148,10 @@ def test_the_prediction_says_both_orders():
     assert prediction.first_order == pytest.approx(prediction.excursion, rel=3e-3)
     other = predict_lean(icub(), C2, 0.05)
     assert other.first_order > 1.2 * other.excursion
+    # A sine goes as far to either side, and to one of them first.
+    for amplitude, contact in ((0.05, "r_sole"), (-0.05, "l_sole")):
+        sine = predict(lateral_reference(icub(), Sine(amplitude, 0.1)), C1)
+        assert (sine.contact, sine.how) == (contact, "tips")
     still = predict(lateral_reference(icub(), Hold()), C1)
     assert still.excursion == np.inf
 

@@ -3,14 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from reproductions import small_reproduction
 
 import copsense
-from copsense.closed_loop import sway_in_simulation
-from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel
+from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel, tracking_error
 from copsense.report import report_figures, write_report
-from copsense.reproduction import LIMITS
+from copsense.report.sway import score_rows, sway_runs
+from copsense.reproduction import LIMITS, sway_in_simulation
 
 WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 
@@ -69,12 +70,37 @@ def test_claims_fail_on_other_recordings(sway):
 
 def test_the_report_shows_the_closed_loop(sway, tmp_path):
     claims = evaluate_sway_claims(sway)
-    reproduction = replace(small_reproduction(), sway=sway, sway_claims=claims)
+    table = pd.DataFrame(
+        [
+            {"robot": "icub", "conditions": "ideal", "parameters": "", "reason": "", "key": name}
+            | {"trial": "lean", "score": "tip_excursion", "unit": "m", "status": "measured"}
+            | {"posture": "own", "controller": name, "contact": "r_sole", "value": value}
+            | {
+                "low": value - 1e-5,
+                "high": value + 1e-5,
+                "predicted": 0.0321,
+                "first_order": 0.0322,
+            }
+            for name, value in (("minimum-wrench", 0.0311), ("minimum-torque", 0.0411))
+        ]
+    )
+    reproduction = replace(small_reproduction(), sway=sway, sway_claims=claims, benchmark=table)
     names = {f.name for f in report_figures(reproduction)}
     assert {"loop_6a", "loop_6b", "loop_7a", "loop_7b", "loop_8", "loop_9b"} <= names
     page = write_report(reproduction, tmp_path / "report").read_text(encoding="utf-8")
     assert 'id="closed-loop"' in page
     assert "r_sole tips at" in page
+    for told in ("31.1 mm", "41.1 mm", "32.1 mm", "32.2 mm", "Slow leans", "No hardware data"):
+        assert told in page, told
+    assert [row["rank"] for row in score_rows(table)] == ["2", "1"]
+    rows = {row["name"]: row for row in sway_runs(sway)}
+    stood = stretch(sway.torque)
+    assert rows["minimum torque"]["margin"] == f"{stood.margin.min() * 1e3:.2f} mm"
+    # The catching up of the first half second is in the error.
+    error = (sway.torque["com"] - sway.torque["com_target"]).sel(com_axis="y").values
+    assert rows["minimum torque"]["error"] == f"{np.sqrt(np.mean(error**2)) * 1e3:.3f} mm"
+    assert tracking_error(sway.torque) > np.sqrt(np.mean(stood.error**2))
+    assert "--limits" in page.partition("minimum-torque_within.nc")[0].rpartition("copsense")[2]
     assert "copsense balance icub --criterion minimum-wrench --reference sine:0.041:0.1" in page
     recorded = sorted(p.name for p in (tmp_path / "report" / "data").glob("closed_loop_*.nc"))
     assert len(recorded) == 5

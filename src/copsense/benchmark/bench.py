@@ -20,10 +20,7 @@ from copsense.controllers import (
     lateral_reference,
     load_controller,
 )
-from copsense.errors import (
-    CopsenseError,
-    UnreachablePostureError,
-)
+from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
 from copsense.simulation import MujocoSimulator, Push, Scenario, rollout
 from copsense.stance import Stance
 
@@ -53,9 +50,8 @@ class Bench:
         """Of the controller, and of what predicts a push."""
         return self.case.controller.gains_of(self.stance.robot)
 
-    @cached_property
-    def controller(self) -> Controller:
-        """What balances the robot."""
+    def make_controller(self) -> Controller:
+        """What balances the robot, anew for each run: it may remember."""
         choice = self.case.controller
         if choice.source:
             return load_controller(choice.source, self.stance)
@@ -76,19 +72,26 @@ class Bench:
         push: Push | None = None,
         **changes: Any,
     ) -> xr.Dataset:
-        """One rollout in the case's conditions, with a push or changed fields on top."""
+        """One rollout in the case's conditions, with a push or changed fields on top.
+
+        Raises:
+            ControllerError: the controller failed on the way, which tells nothing of the robot.
+        """
         values = dict(self.case.conditions.values or {}) | changes
         if push is not None:
             values["pushes"] = (*values.get("pushes", ()), push)
         scenario = Scenario(duration, reference, **values)
         tick = self._progress
-        return rollout(
+        run = rollout(
             self._simulator,
-            self.controller,
+            self.make_controller(),
             scenario,
             until=until,
             progress=None if tick is None else lambda n: tick(n * scenario.control_period),
         )
+        if run.attrs["end_kind"] == "controller":
+            raise ControllerError(str(run.attrs["end_reason"]))
+        return run
 
     def lean(self, reach: float | None, speed: float, sign: float) -> tuple[PathReference, float]:
         """The reference of a lateral lean, and how far it goes [m].
@@ -115,9 +118,18 @@ class Bench:
     def statics(self, reference: PathReference) -> tuple[Statics | None, str]:
         """What the statics say along a reference; or nothing, and why."""
         try:
-            return statics(reference, self.criterion, self.limits), ""
+            return statics(reference, self.criterion, self.limits, self._friction), ""
         except CopsenseError as error:
             return None, f"no static prediction: {error}"
+
+    @property
+    def _friction(self) -> float:
+        """Of the ground when a run starts."""
+        friction = self._simulator.settings.friction
+        for change in (self.case.conditions.values or {}).get("friction", ()):
+            if change.start <= 0 and change.contact is None:
+                friction = change.friction
+        return friction
 
     @cached_property
     def leg_joints(self) -> tuple[str, ...]:

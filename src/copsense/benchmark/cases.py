@@ -15,7 +15,7 @@ from copsense._version import __version__
 from copsense.arrays import finite_number
 from copsense.benchmark.trials import Falls, Trial
 from copsense.contact import Contact, rectangle
-from copsense.controllers import STIFF, Gains, public_gains
+from copsense.controllers import STIFF, Gains, controller_code, public_gains
 from copsense.criterion import Criterion, criterion_named
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits
@@ -169,7 +169,7 @@ class ControllerChoice:
         criterion_named(self.criterion, self.characteristic_length)
         if self.gains not in _GAINS:
             raise UnknownNameError("set of gains", self.gains, _GAINS)
-        if self.source and not all(self.source.partition(":")):
+        if self.source and not all(self.source.rpartition(":")):
             raise InvalidInputError(
                 f"the controller {self.source!r} is not understood. Give MODULE:ATTRIBUTE, a "
                 "callable stance -> controller."
@@ -261,6 +261,9 @@ class Case:
         if self.robot.source not in PRESETS and Path(self.robot.source).is_file():
             content = Path(self.robot.source).read_bytes()
             found["robot"]["content"] = hashlib.sha256(content).hexdigest()[:12]
+        if self.controller.source:
+            content = controller_code(self.controller.source)
+            found["controller"]["content"] = hashlib.sha256(content).hexdigest()[:12]
         return found | {"software": _software()}
 
     @cached_property

@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from copsense.errors import InvalidInputError
+
+_FINEST = 1_000_000  # steps of a bisection
 _Z = 1.959963984540054  # of a two-sided 95 % interval
 
 
@@ -55,6 +58,21 @@ class Bracket:
         return min(known), max(known)
 
 
+def count_steps(mild: float, severe: float, step: float) -> int:
+    """How many steps lead from one end of a bisection to the other.
+
+    Raises:
+        InvalidInputError: so many that a step is lost in rounding.
+    """
+    count = abs(severe - mild) / step
+    if not count <= _FINEST:
+        raise InvalidInputError(
+            f"a bisection from {mild:g} to {severe:g} in steps of {step:g} is finer than any "
+            f"simulation. Give {abs(severe - mild) / _FINEST:.1g} or more."
+        )
+    return max(1, math.ceil(count - 1e-9))
+
+
 def bisect(survives: Callable[[float], bool], mild: float, severe: float, step: float) -> Bracket:
     """Bisect over mild, mild + step, ..., severe for where `survives` changes, taken as once.
 
@@ -63,9 +81,12 @@ def bisect(survives: Callable[[float], bool], mild: float, severe: float, step: 
         mild: the end that should survive; it is asked last, and only if nothing else did.
         severe: the end that should not; it is asked first.
         step: between the values; the last one is shortened to end at `severe`.
+
+    Raises:
+        InvalidInputError: the step is a millionth of the range or less.
     """
     direction = 1.0 if severe >= mild else -1.0
-    count = max(1, math.ceil(abs(severe - mild) / step - 1e-9))
+    count = count_steps(mild, severe, step)
 
     def value(k: int) -> float:
         # Rounded, so that 0.3 is tried and not 0.30000000000000004.

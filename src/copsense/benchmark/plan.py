@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
+from copsense.benchmark.building import as_table, build, check_fields
 from copsense.benchmark.cases import (
     Case,
     Conditions,
@@ -22,7 +23,6 @@ from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.simulation import Scenario
 
-C = TypeVar("C")
 IDEAL = Conditions()
 
 
@@ -92,6 +92,8 @@ def read_plan(path: str | Path) -> tuple[Case, ...]:
             if not isinstance(table, Mapping):
                 raise InvalidInputError(f"{kind}.{name} is no table. Write [{kind}.{name}].")
             try:
+                if "name" in table:
+                    raise InvalidInputError("a name is that of its table. Leave it out.")
                 known[kind][name] = read(name, dict(table))
             except UnknownNameError:
                 raise
@@ -105,7 +107,7 @@ def read_plan(path: str | Path) -> tuple[Case, ...]:
     blocks = content.get("block", [{}])
     cases: list[Case] = []
     for block in blocks if isinstance(blocks, list) else [blocks]:
-        cases += _block(block, known, path.name)
+        cases += _block(as_table(block, f"a [[block]] in {path.name}"), known, path.name)
     return tuple(cases)
 
 
@@ -118,6 +120,8 @@ def _block(
             raise UnknownNameError(f"part of a [[block]] in {where}", kind, known)
     for kind, there in known.items():
         names = block.get(kind, list(there))
+        if names == []:
+            raise InvalidInputError(f"a [[block]] in {where} has no {kind}. Name some of them.")
         for name in names if isinstance(names, list) else [names]:
             if name not in there:
                 raise UnknownNameError(f"{kind} of a [[block]] in {where}", name, there)
@@ -134,6 +138,7 @@ def _block(
 def _robot(name: str, table: dict[str, Any]) -> RobotChoice:
     table.setdefault("source", name)
     if "soles" in table:
+        check_fields(RobotChoice, {"soles": table["soles"]})
         table["soles"] = {frame: tuple(sole) for frame, sole in table["soles"].items()}
     return build(RobotChoice, table | {"name": name})
 
@@ -141,6 +146,7 @@ def _robot(name: str, table: dict[str, Any]) -> RobotChoice:
 def _posture(name: str, table: dict[str, Any]) -> PostureChoice:
     if "joints_deg" in table:
         degrees = table.pop("joints_deg")
+        check_fields(PostureChoice, {"joints": degrees})
         table["joints"] = {joint: math.radians(angle) for joint, angle in degrees.items()}
     return build(PostureChoice, table | {"name": name})
 
@@ -148,7 +154,9 @@ def _posture(name: str, table: dict[str, Any]) -> PostureChoice:
 def _controller(name: str, table: dict[str, Any]) -> ControllerChoice:
     if "limits" in table:
         # TOML has no null: false switches a limit off.
-        values = {key: None if v is False else v for key, v in dict(table["limits"]).items()}
+        values = {
+            key: None if v is False else v for key, v in as_table(table["limits"], "limits").items()
+        }
         table["limits"] = build(Limits, values)
     return build(ControllerChoice, table | {"name": name})
 
@@ -161,8 +169,9 @@ def _conditions(name: str, table: dict[str, Any]) -> Conditions:
         if kinds and isinstance(value, Mapping):
             value = build(kinds[0], dict(value))  # type: ignore[arg-type]
         elif kinds and isinstance(value, list):
-            value = tuple(build(kinds[0], dict(part)) for part in value)  # type: ignore[arg-type]
+            value = tuple(build(kinds[0], as_table(part, field)) for part in value)  # type: ignore[arg-type]
         values[field] = value
+    check_fields(Scenario, values)
     return Conditions(name, values)
 
 
@@ -176,17 +185,3 @@ def _parts(hint: Any) -> list[Any]:
     for part in get_args(hint):
         found += [part, *_parts(part)]
     return found
-
-
-def build(cls: type[C], values: Mapping[str, Any]) -> C:
-    """A dataclass from a table of its fields.
-
-    Raises:
-        UnknownNameError: a field that it lacks.
-    """
-    known = [f.name for f in fields(cls) if f.init]  # type: ignore[arg-type]
-    for name in values:
-        if name not in known:
-            raise UnknownNameError(f"field of {cls.__name__}", name, known)
-    # TOML has lists where values have tuples.
-    return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})

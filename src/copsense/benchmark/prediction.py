@@ -17,7 +17,8 @@ from copsense.criterion import Criterion
 from copsense.equilibrium import solve_equilibrium
 from copsense.limits import Limits
 from copsense.sensitivity import cop_sensitivity
-from copsense.simulation.prediction import predict
+from copsense.simulation import PhysicsSettings
+from copsense.simulation.prediction import farther_side, force_gaps, predict
 from copsense.stance import Stance
 
 _AFTER = 1.0  # s: the law has answered a push by then
@@ -31,10 +32,10 @@ class Statics:
         values: the path's coordinate, CoM y from the start (N,) [m].
         margins: smallest distance of a CoP to its sole's edge (N,) [m]; infinite without soles.
         torques: static joint torques (N, n) [Nm].
-        excursion: distance to the first tip along the path, to the signal's side [m]; infinite
-            where nothing tips.
-        contact: which contact tips first, or nothing.
-        first_order: distance to the first tip by CoPs and sensitivity at the start alone [m].
+        excursion: distance along the path to the first tip, lift or slip, to the signal's side [m];
+            infinite where nothing does.
+        contact: which contact does so first, or nothing.
+        first_order: the same by CoPs, forces and sensitivity at the start alone [m].
         edges: distance of every CoP to every edge at the start (e,) [m].
         edge_slopes: their derivative along the path at the start (e,).
         torque_start: torques at the start (n,) [Nm].
@@ -83,14 +84,17 @@ class Statics:
 
 
 def statics(
-    reference: PathReference, criterion: Criterion, limits: Limits | None = None
+    reference: PathReference,
+    criterion: Criterion,
+    limits: Limits | None = None,
+    friction: float = PhysicsSettings.friction,
 ) -> Statics:
-    """The statics along a reference's path, its start at zero.
+    """The statics along a reference's path, its start at zero; see `predict`.
 
     Raises:
         CopsenseError: no equilibrium somewhere on the path, such as beyond the limits.
     """
-    path, prediction = reference.path, predict(reference, criterion, limits)
+    path, prediction = reference.path, predict(reference, criterion, limits, friction)
     values = np.asarray(path.values, dtype=float)
     low, high = reference.signal.extent
     wanted = (values > low - 3e-3) & (values < high + 3e-3)  # the path's spacing, and some
@@ -121,9 +125,23 @@ def statics(
     rate = np.concatenate(rates)
     distance = np.concatenate(edges) - off * rate
     torque_slope = here.torque_derivative @ (here.basis.T @ tangent)
-    outwards = rate * (1.0 if high >= -low else -1.0)
+    # A contact may lift or slip instead: all that a point can do.
+    weight = path.stances[start].robot.weight
+    force_rates = (here.wrench_derivative @ (here.basis.T @ tangent))[:, :3] / weight
+    forces = here.equilibrium.wrenches[:, :3] / weight - off * force_rates
+    gaps, gap_rates = [], []
+    for contact, force, force_rate in zip(
+        path.stances[start].contacts, forces, force_rates, strict=True
+    ):
+        gaps.append(force_gaps(contact, force[None], friction)[0])
+        size = float(np.hypot(*force[:2]))
+        sideways = force[:2] @ force_rate[:2] / size if size else float(np.hypot(*force_rate[:2]))
+        straight = np.array([0.0, 0.0, force_rate[2]])
+        gap_rates.append(force_gaps(contact, straight[None], friction)[0] - [0.0, sideways])
+    left = np.concatenate([distance, *gaps])
+    outwards = np.concatenate([rate, *gap_rates]) * farther_side(reference.signal)
     closing = outwards < -1e-12
-    travel = (distance[closing] / -outwards[closing]).min() if closing.any() else np.inf
+    travel = (left[closing] / -outwards[closing]).min() if closing.any() else np.inf
     return Statics(
         values[use],
         margins,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pandas as pd
 
@@ -31,14 +33,17 @@ def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
 
     A controller's rank is 1 plus the number of those clearly better: whose interval lies wholly
     beyond its own. Within their resolution controllers share a rank. A run that failed
-    or tipped too early comes last.
+    or tipped too early comes last; where every one did, or nothing can be measured, none is ranked.
 
     Returns:
-        The rows of the table with ``rank`` and ``of``, the number of controllers in the setting.
+        The rows of the table that are ranked with ``rank`` and ``of``, the number of controllers in
+        the setting.
     """
-    ranked = table.copy()
+    told = ~table["status"].isin(["failed", "tipped", "none"])
+    some = told.groupby([table[name] for name in _SETTING]).transform("any")
+    ranked = table[some & (table["status"] != "none")].copy()
     ranked["rank"], ranked["of"] = 1, 1
-    for (*_, score), rows in table.groupby(_SETTING, sort=False):
+    for (*_, score), rows in ranked.groupby(_SETTING, sort=False):
         larger = SCORES[str(score)].larger
         failed = rows["status"].isin(["failed", "tipped"]).to_numpy()
         # Better is larger from here on.
@@ -58,8 +63,8 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
 
     Returns:
         A row for each trial, score and controller, the best first, with ``mean_rank``, ``wins``
-        (settings in which none is better), ``settings``, ``failures`` (failed or tipped), and
-        ``mean`` of the values (NaN where one was not measured).
+        (settings in which none is better), ``settings``, ``failures`` (of these, failed or tipped),
+        and ``mean`` of the values (NaN where one was not measured).
     """
     ranked, rows = rank_scores(table), []
     for (trial, score), group in ranked.groupby(["trial", "score"], sort=False):
@@ -89,15 +94,22 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
     return found.drop(columns="_order").reset_index(drop=True)
 
 
+def _own(parameters: str) -> bool:
+    """Whether a case's controller is somebody's own."""
+    return bool(parameters and json.loads(parameters)["controller"].get("source"))
+
+
 def agreement(table: pd.DataFrame) -> pd.DataFrame:
     """How well the predictions hold, over the rows that were measured. See `CAVEAT`.
+
+    Controllers of one's own are left out: the prediction only assumes their law.
 
     Returns:
         A row per score and prediction (``"path"``, exact, or ``"first order"``): ``cases``, mean
         and largest absolute error in the score's unit, Pearson's ``correlation`` with the ends
         ``low`` and ``high`` of its 95 % interval (Fisher's z; NaN under four cases).
     """
-    rows = []
+    rows, table = [], table[~table["parameters"].map(_own)]
     for score in _COMPARED:
         of_score = table[(table["score"] == score) & (table["status"] == "measured")]
         for prediction, column in (("path", "predicted"), ("first order", "first_order")):

@@ -33,7 +33,7 @@ def run_case(case: Case, progress: Callable[[float], object] | None = None) -> l
         return score_trial(Bench(case, progress))
     except CopsenseError as error:
         return failed(case.trial.scores, str(error))
-    except Exception as error:  # a user's controller or a library: its row says so
+    except (Exception, SystemExit) as error:  # a user's controller or a library: its row says so
         return failed(case.trial.scores, f"{type(error).__name__}: {error}")
 
 
@@ -41,21 +41,23 @@ def run_benchmark(
     plan: Sequence[Case],
     output: str | Path | None = None,
     *,
-    jobs: int = 1,
+    jobs: int | None = None,
     overwrite: bool = False,
     progress: Callable[[float], object] | None = None,
 ) -> pd.DataFrame:
     """Run every case of a plan into one table.
 
     With an output, the table is written anew, whole, after each case. If it is there already, its
-    rows are kept and only what is missing is run; an interrupted run is so resumed. The table is
-    the same, bit for bit, whatever the number of processes and however often it was interrupted.
+    rows are kept and only what is missing or failed is run; an interrupted run is so resumed. The
+    table is the same, bit for bit, whatever the number of processes and however often it was
+    interrupted.
 
     Args:
         plan: the cases, with distinct names.
         output: the table, ``.csv``; None keeps it in memory.
-        jobs: how many processes, each with one BLAS thread. More than one needs a main module
-            that can be imported, as `multiprocessing` has it.
+        jobs: how many processes, each with one BLAS thread; a controller or a library that
+            crashes then costs its own case alone. They need a main module that can be imported,
+            as `multiprocessing` has it. None runs the cases here, in turn.
         overwrite: start a table anew that is there already.
         progress: called with the share of the plan done since the last call, out of 1.
 
@@ -68,12 +70,12 @@ def run_benchmark(
             cannot be written.
     """
     check_plan(plan)
-    if jobs < 1:
+    if jobs is not None and jobs < 1:
         raise InvalidInputError(f"a benchmark cannot run in {jobs} processes. Give 1 or more.")
     path = None if output is None else check_output(output, suffixes=(".csv",), overwrite=True)
     done: dict[str, list[Score]] = {}
     if path is not None and path.exists() and not overwrite:
-        done = scores_of(finished_rows(path, plan))
+        done = finished_scores(path, plan)
     total = sum(case.trial.seconds for case in plan)
     left = {case.key: case.trial.seconds for case in plan}
 
@@ -90,10 +92,9 @@ def run_benchmark(
             tick(case, left[case.key])
         else:
             missing.append(case)
-    in_turn = jobs == 1 or len(missing) < 2
     running = (
         run_here(missing, run_case, tick)
-        if in_turn
+        if jobs is None
         else run_in_processes(missing, run_case, min(jobs, len(missing)), tick)
     )
     for case, scores in running:
@@ -122,20 +123,30 @@ def check_plan(plan: Sequence[Case]) -> None:
         seen[case.label] = case.key
 
 
-def finished_rows(path: Path, plan: Sequence[Case]) -> pd.DataFrame:
-    """The rows of a table that a plan can go on with.
+def finished_scores(path: Path, plan: Sequence[Case]) -> dict[str, list[Score]]:
+    """The scores in a table that a plan need not run again, by the case's key.
+
+    A case that failed is run again: its controller may be mended, or the memory be there now. So is
+    one of which rows are missing.
 
     Raises:
         OutputError: it was made by other parameters; the message says what differs.
     """
     table = load_benchmark(path)
+    lost = table.loc[table["status"] == "failed", "key"]
+    table = table[~table["key"].isin(lost)]
     if unlike := differences(table, plan):
         shown = "; ".join(unlike[:6]) + ("; ..." if len(unlike) > 6 else "")
         raise OutputError(
             f"{path} was made by other parameters: {shown}. Give another path, or --force "
             "(overwrite=True) to start it anew."
         )
-    return table
+    whole = {case.key: list(case.trial.scores) for case in plan}
+    return {
+        key: scores
+        for key, scores in scores_of(table).items()
+        if [score.score for score in scores] == whole[key]
+    }
 
 
 def _finished(

@@ -24,7 +24,9 @@ _AFTER = 1.0  # s to watch after a push
 _SETTLED = 1.0, 0.2  # s, or share of a run: how much of its beginning is not scored
 _FASTEST = 0.5  # m/s of the CoM: a push that gives it more tips everything
 
-Status = Literal["measured", "bound", "tipped", "failed"]
+_POINTS = "no contact has a sole's edge"
+
+Status = Literal["measured", "bound", "tipped", "none", "failed"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,8 @@ class Score:
     Attributes:
         score: its name, one of `SCORES`.
         status: ``"measured"``; ``"bound"`` where only the interval is known, as when nothing
-            tipped; ``"tipped"`` where a contact tipped before it could be measured; ``"failed"``.
+            tipped; ``"tipped"`` where a contact tipped before it could be measured; ``"none"``
+            where the robot has nothing of the kind, as point feet no edges; ``"failed"``.
         value: in the score's unit, NaN unless measured.
         low: lower end of what the value may be: resolution, bracket, or 95 % interval of a rate.
         high: upper end.
@@ -127,7 +130,7 @@ def _sway(trial: Sway, bench: Bench) -> list[Score]:
         if math.isfinite(smallest):
             margin = _measured(margin, smallest)
         else:
-            margin = replace(margin, reason=_and("no contact has a sole's edge", note))
+            margin = replace(margin, status="none", reason=_and(_POINTS, note))
         error = (late["com"] - late["com_target"]).sel(com_axis="y").values
         torque = late["torque"].values
         y = trial.amplitude * np.sin(2 * np.pi * trial.frequency * late["time"].values)
@@ -144,8 +147,7 @@ def _sway(trial: Sway, bench: Bench) -> list[Score]:
         rows = {name: replace(row, status="tipped", contact=contact) for name, row in rows.items()}
         margin = replace(rows["smallest_margin"], status="bound", low=-math.inf, high=0.0)
     if expected is not None:
-        size = abs(trial.amplitude)
-        on_path, first_order = expected.smallest_margin(-size, size)
+        on_path, first_order = expected.smallest_margin(*_extent(trial))
         margin = replace(margin, predicted=_known(on_path), first_order=_known(first_order))
     return [margin, *(rows[name] for name in trial.scores[1:])]
 
@@ -196,7 +198,7 @@ def _rest(trial: Rest, bench: Bench) -> list[Score]:
     cop = float(np.nanmax(off)) if np.isfinite(off).any() else math.nan
     first = _measured(Score("wrench_error", "failed", predicted=0.0, reason=reason), wrench)
     if not math.isfinite(cop):
-        return [first, Score("cop_error", "failed", reason="no centre of pressure is commanded")]
+        return [first, Score("cop_error", "none", reason="no centre of pressure is commanded")]
     return [first, _measured(Score("cop_error", "failed", predicted=0.0, reason=reason), cop)]
 
 
@@ -268,6 +270,15 @@ def _breaking(trial: Breaking, bench: Bench) -> list[Score]:
     y = np.linspace(-trial.amplitude, trial.amplitude, 201)
     on_path, first_order = expected.torque_peak(y, legs)
     return [replace(row, predicted=on_path, first_order=first_order)]
+
+
+def _extent(trial: Sway) -> tuple[float, float]:
+    """Least and largest CoM y of the scored part of a sway, from its start [m]."""
+    begin = min(_SETTLED[0], _SETTLED[1] * trial.seconds) * trial.frequency
+    turns = np.arange(math.ceil(2 * begin - 0.5), math.floor(2 * trial.periods - 0.5) + 1)
+    at = np.concatenate([[begin, trial.periods], 0.25 + 0.5 * turns])  # periods
+    y = trial.amplitude * np.sin(2 * np.pi * at)
+    return float(y.min()), float(y.max())
 
 
 def _bracketed(name: str, found: Bracket, what: str, note: str = "") -> Score:

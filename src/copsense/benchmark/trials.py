@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from copsense.arrays import finite_number
+from copsense.benchmark.building import check_fields
+from copsense.benchmark.intervals import count_steps
 from copsense.errors import InvalidInputError, UnknownNameError
 
 
@@ -108,6 +110,7 @@ class PushToTip:
         finite_number(self.resolution, "the resolution of a push [N s]", positive=True)
         if self.largest is not None:
             finite_number(self.largest, "the largest push [N s]", positive=True)
+            count_steps(0.0, self.largest, 2 * self.resolution)
         finite_number(self.duration, "the duration of a push [s]", positive=True)
         _check_side(self.side)
 
@@ -261,6 +264,15 @@ class Breaking:
                 object.__setattr__(self, name, usual)
             finite_number(getattr(self, name), f"{name} of the {self.parameter}")
         finite_number(self.step, f"the step of the {self.parameter}", positive=True)
+        count_steps(self.mild, self.severe, self.step)  # type: ignore[arg-type]
+        rises = _RANGES[self.parameter][0] < _RANGES[self.parameter][1]
+        ends = (self.mild, self.severe) if rises else (self.severe, self.mild)
+        if not 0 <= ends[0] < ends[1] or (ends[0] == 0 and not rises):  # type: ignore[operator]
+            order = "0 or more, severe over mild" if rises else "over 0, severe under mild"
+            raise InvalidInputError(
+                f"the {self.parameter} from mild = {self.mild:g} to severe = {self.severe:g} gets "
+                f"no worse. Give both {order}."
+            )
         finite_number(self.amplitude, "the amplitude of a sway [m]")
         finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
 
@@ -293,7 +305,7 @@ KINDS: dict[str, type[Lean | PushToTip | Sway | Rest | Falls | Breaking]] = {
 }
 
 
-def trial_named(kind: str, **options: object) -> Trial:
+def trial_named(kind: str, /, **options: object) -> Trial:
     """A trial by the name that plans and the command give it.
 
     Raises:
@@ -303,10 +315,11 @@ def trial_named(kind: str, **options: object) -> Trial:
     if kind not in KINDS:
         raise UnknownNameError("disturbance", kind, KINDS)
     cls = KINDS[kind]
-    if cls is Breaking:
-        options = {"parameter": kind} | options
-    known = [name for name in cls.__dataclass_fields__ if name != "parameter" or cls is Breaking]
+    known = [field.name for field in fields(cls) if field.name != "parameter"]  # the kind says it
+    check_fields(cls, options)
     for name in options:
         if name not in known:
             raise UnknownNameError(f"option of the trial {kind!r}", name, known)
+    if cls is Breaking:
+        options = {"parameter": kind} | options
     return cls(**options)  # type: ignore[arg-type]

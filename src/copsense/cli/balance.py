@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import shlex
+import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -101,6 +104,7 @@ def balance(
     The criterion (one, default minimum-torque) shares the load among the contacts. The answer says
     how well the CoM was tracked, the smallest margins, which contact tipped first beside the
     static prediction, and whether the robot fell. Exit code 1 where it did not go to the end.
+    Ctrl-C ends the run and keeps what was recorded.
     """
     from copsense.controllers import lateral_reference
     from copsense.simulation import MujocoSimulator, Scenario, rollout
@@ -137,13 +141,17 @@ def balance(
     law = read_controller(stance, controller, criterion, gains, gain, allowed)
     path = lateral_reference(stance, signal)
     total = round(scenario.duration / scenario.control_period)
-    with tqdm(total=total, desc="balancing", unit="step", disable=None, leave=False) as bar:
+    with (
+        tqdm(total=total, desc="balancing", unit="step", disable=None, leave=False) as bar,
+        _interrupts() as stop,
+    ):
         recording = rollout(
             simulator,
             law,
             replace(scenario, reference=path),
             until=until,
             progress=bar.update,
+            stop=stop,
         )
     if controller is None or criteria:  # of a user's own law the analysis knows nothing
         recording = predict(path, criterion, allowed).attach(recording)
@@ -164,7 +172,25 @@ def balance(
         echo_json(summary)
     else:
         _print(summary, [path for path in (output, picture, video) if path])
-    click.get_current_context().exit(0 if summary["end"]["kind"] == "completed" else 1)
+    codes = {"completed": 0, "stopped": 130}
+    click.get_current_context().exit(codes.get(summary["end"]["kind"], 1))
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed; the second one is that of anywhere."""
+    pressed: list[int] = []
+
+    def press(number: int, frame: object) -> None:
+        if pressed:
+            raise KeyboardInterrupt
+        pressed.append(number)
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _summary(recording: Any) -> dict[str, Any]:
@@ -204,6 +230,7 @@ def _summary(recording: Any) -> dict[str, Any]:
         "static_prediction": {
             "excursion": attributes.get("static_excursion", math.nan),
             "contact": attributes.get("static_contact", ""),
+            "how": attributes.get("static_how", ""),
         },
     }
 
@@ -232,7 +259,8 @@ def _print(summary: dict[str, Any], written: list[str]) -> None:
         click.echo("  no contact tipped")
     if math.isfinite(static["excursion"]):
         click.echo(
-            f"  static prediction: {static['contact']} tips at {static['excursion'] * 1e3:.1f} mm"
+            f"  static prediction: {static['contact']} {static['how']} at "
+            f"{static['excursion'] * 1e3:.1f} mm"
         )
     for path in written:
         click.echo(f"written: {path}")

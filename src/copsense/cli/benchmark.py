@@ -99,7 +99,7 @@ def benchmark(
     Exit code 1 where a run failed.
     """
     from copsense.benchmark import read_plan, run_benchmark
-    from copsense.benchmark.run import check_plan, finished_rows
+    from copsense.benchmark.run import check_plan, finished_scores
     from copsense.storage import check_output
 
     if importlib.util.find_spec("mujoco") is None:
@@ -114,18 +114,19 @@ def benchmark(
         _check_alone(robots, options)
         plan = read_plan(plan_file)
     check_plan(plan)
+    _check_robots(plan)
     kept = 0
     if output is not None:
         path = check_output(output, suffixes=(".csv",), overwrite=True)
         if path.exists() and not force:
-            kept = finished_rows(path, plan)["key"].nunique()
+            kept = len(finished_scores(path, plan))
             click.echo(f"{kept} of {len(plan)} cases are in {path} already.", err=True)
     processes = jobs or min(os.cpu_count() or 1, 8)
     try:
         with _bar() as update:
             table = run_benchmark(plan, output, jobs=processes, overwrite=force, progress=update)
     except KeyboardInterrupt:
-        if output is not None:
+        if output is not None and Path(output).exists():
             click.echo(
                 f"\nthe cases that were done are kept in {output}; the same command"
                 f"{' without --force' if force else ''} goes on with the others.",
@@ -181,7 +182,6 @@ def _plan(
 ) -> tuple[Case, ...]:
     """The cases that the options ask for."""
     from copsense.benchmark import ControllerChoice, PostureChoice, RobotChoice, make_plan
-    from copsense.robots import PRESETS, load_robot
 
     within = read_limits(limits)
     controllers: list[ControllerChoice] = [
@@ -191,8 +191,6 @@ def _plan(
     trials = _trials(disturbances or ("lean", "push", "sway"), repeats, seed, quick)
     cases: list[Case] = []
     for source in dict.fromkeys(robots):
-        if source not in PRESETS:
-            load_robot(source)  # a name mistyped is no failed row
         robot = RobotChoice(source, contacts=contacts)
         chosen = [_posture(text) for text in dict.fromkeys(postures)]
         if not chosen:
@@ -206,6 +204,18 @@ def _plan(
             posture.angles(source)
         cases += make_plan([robot], chosen, controllers, trials)
     return tuple(cases)
+
+
+def _check_robots(plan: Sequence[Case]) -> None:
+    """Refuse robots and frames that are not there: a name mistyped is no failed row."""
+    from copsense.robots import PRESETS, load_robot
+
+    asked = ((c.robot.source, (*c.robot.contacts, *(c.robot.soles or ()))) for c in plan)
+    for source, frames in dict.fromkeys(asked):
+        if source not in PRESETS or frames:
+            robot = load_robot(source)
+            for frame in frames:
+                robot.frame(frame)
 
 
 def _posture(text: str) -> PostureChoice:
@@ -314,7 +324,8 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
                 click.echo(f"    {row.controller}: {_value(row, factor)}")
     click.echo(f"\nranking over {len(plan)} cases (mean rank; shared within the resolution)")
     for (trial, score), rows in rank_controllers(table).groupby(["trial", "score"], sort=False):
-        order = ", ".join(f"{row.controller} {row.mean_rank:.2g}" for row in rows.itertuples())
+        alike = rows["settings"].nunique() == 1
+        order = ", ".join(_ranked(row, alike) for row in rows.itertuples())
         click.echo(f"  {trial}, {str(score).replace('_', ' ')}: {order}")
     found = agreement(table)
     if not len(found):
@@ -333,15 +344,27 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
     click.echo(f"  {CAVEAT}")
 
 
+def _ranked(row: Any, alike: bool) -> str:
+    said = [] if alike else [f"over {row.settings} setting{'s' * (row.settings != 1)}"]
+    said += [f"{row.failures} of {row.settings} not measured"] if row.failures else []
+    return f"{row.controller} {row.mean_rank:.2g}" + (f" ({', '.join(said)})" if said else "")
+
+
+_VERBS = {"slipped": "slips", "left the ground": "lifts"}
+
+
 def _shown(unit: str) -> tuple[str, float]:
     """Lengths are shown in millimetres."""
     return ("mm", 1e3) if unit == "m" else (unit, 1.0)
 
 
+_UNMEASURED = {"failed": "failed", "tipped": "not measured", "none": "nothing to measure"}
+
+
 def _value(row: Any, factor: float) -> str:
     low, high = row.low * factor, row.high * factor
-    if row.status in ("failed", "tipped"):
-        return f"{'failed' if row.status == 'failed' else 'not measured'}: {row.reason}"
+    if row.status in ("failed", "tipped", "none"):
+        return f"{_UNMEASURED[row.status]}: {row.reason}"
     if row.status == "bound":
         text = f"at least {low:.4g}" if math.isfinite(low) else f"at most {high:.4g}"
         text += f" ({row.reason})"
@@ -355,4 +378,7 @@ def _value(row: Any, factor: float) -> str:
         if math.isfinite(value)
     ]
     text += f", {', '.join(said)}" if said else ""
-    return text + (f"; {row.contact} tips" if row.contact else "")
+    if not row.contact:
+        return text
+    how = [verb for words, verb in _VERBS.items() if f"{row.contact} {words}" in row.reason]
+    return f"{text}; {row.contact} {how[0] if how else 'tips'}"

@@ -110,10 +110,12 @@ def map_command(
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
     from copsense.batch import BatchKernel
-    from copsense.maps import map_postures
+    from copsense.maps import MapPlan
+    from copsense.maps.mapping import fill_map
     from copsense.maps.reach import height_advice
     from copsense.maps.sampling import sampling_of
     from copsense.maps.store import check_store
+    from copsense.maps.summary import summarise
     from copsense.storage import check_output
 
     check_store(output)
@@ -142,14 +144,9 @@ def map_command(
             update(count)
 
         try:
-            summary = map_postures(
-                stance,
-                sampling,
-                chosen,
+            store = fill_map(
+                MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations),
                 output,
-                within,
-                chunk=chunk,
-                configurations=configurations,
                 threads=threads,
                 scheduler=scheduler,
                 workers=local,
@@ -162,6 +159,8 @@ def map_command(
                 err=True,
             )
             click.get_current_context().exit(130)
+    with progress_bar(2 * len(sampling), "summary") as update:
+        summary = summarise(store, update)
     if plot is not None:
         _draw(stance, summary, plot, pair, marginal, force)
     if as_json:

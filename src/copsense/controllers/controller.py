@@ -88,7 +88,7 @@ def ask(
     when = f"controller {controller_name(controller)!r} at {observation.time:.3f} s"
     try:
         answer = controller(observation)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ControllerError(
             f"{when} raised {type(error).__name__}: {error}. Mend the controller at this state."
         ) from error

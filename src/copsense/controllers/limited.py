@@ -57,9 +57,10 @@ class ShareWithinLimits:
         B = problem.base_map
         Z = scipy.linalg.qr(B.T)[0][:, 6:]
         # f = forces + Z y has the wanted momentum rate.
-        y = self._solve(Z.T @ H @ Z, Z.T @ (H @ forces - g), A @ Z, b - A @ forces)
-        if y is not None:
-            return forces + Z @ y
+        if Z.shape[1]:  # one foot has no choice
+            y = self._solve(Z.T @ H @ Z, Z.T @ (H @ forces - g), A @ Z, b - A @ forces)
+            if y is not None:
+                return forces + Z @ y
         price = _PRICE * float(np.abs(H).max())
         change = self._solve(
             H + price * B.T @ B,

@@ -15,12 +15,32 @@ from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
 
+def controller_code(source: str) -> bytes:
+    """What the module of ``MODULE:ATTRIBUTE`` holds, without running it; nothing if not found."""
+    name, folder = _module(source.rpartition(":")[0])
+    module = Path(*name.split("."))
+    for where in (folder, *map(Path, sys.path)):
+        for path in (where / module.with_suffix(".py"), where / module / "__init__.py"):
+            if path.is_file():
+                return path.read_bytes()
+    return b""
+
+
+def _module(given: str) -> tuple[str, Path]:
+    """A module's name, and the folder to look in first."""
+    path = Path(given)
+    if path.suffix == ".py":
+        return path.stem, path.parent.resolve()
+    return given, Path.cwd()
+
+
 def load_controller(source: str, stance: Stance) -> Controller:
-    """A controller from ``MODULE:ATTRIBUTE``, the module found here or installed.
+    """A controller from ``MODULE:ATTRIBUTE``, the module found here or installed, or a file's path.
 
     Args:
-        source: names a class that is made of the stance, a function whose first parameter is
-            ``stance`` and which returns a controller, or a function observation -> torques.
+        source: ``my_module:Mine`` or ``folder/my_module.py:Mine``, a class that is made of the
+            stance, a function whose first parameter is ``stance`` and which returns a controller,
+            or a function observation -> torques.
         stance: robot, contacts and posture it is to balance.
 
     Raises:
@@ -28,18 +48,18 @@ def load_controller(source: str, stance: Stance) -> Controller:
         UnknownNameError: the module has no such attribute.
         ControllerError: making it failed; the message says with what.
     """
-    module_name, colon, attribute = source.partition(":")
-    if not (module_name and colon and attribute):
+    given, colon, attribute = source.rpartition(":")
+    if not (given and colon and attribute):
         raise InvalidInputError(
             f"the controller {source!r} is not understood. Give MODULE:ATTRIBUTE, such as "
             "my_controller:MyController."
         )
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
+    module_name, folder = _module(given)
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InvalidInputError(
             f"the controller's module {module_name!r} cannot be imported "
             f"({type(error).__name__}: {error}). Mend it, run the command in its folder, or "
@@ -56,7 +76,7 @@ def load_controller(source: str, stance: Stance) -> Controller:
     if _made_of_a_stance(made):
         try:
             made = made(stance)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise ControllerError(
                 f"{source} raised {type(error).__name__} when made of the stance: {error}. It is "
                 "called with the stance alone."

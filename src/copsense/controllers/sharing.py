@@ -71,6 +71,8 @@ class ShareByCriterion:
             UndeterminedWrenchError: the criterion and its tie-breaks leave several.
         """
         forces, Z = _allowed(problem.base_map, problem.base_wrench)
+        if not Z.shape[1]:  # one foot has no choice
+            return np.asarray(forces)
         for level in self._levels:
             H, g = level.along(problem, forces, Z)
             cholesky, info = lapack.dpotrf(H)

@@ -24,6 +24,7 @@ from copsense.errors import CopsenseError, InvalidInputError, MissingExtraError,
 from copsense.maps.evaluation import ChunkEvaluator
 from copsense.maps.plan import MapPlan
 from copsense.maps.store import MapStore, open_map
+from copsense.maps.writing import write_chunk
 
 _TIMEOUT = 5.0  # s for a scheduler to answer
 _PATIENCE = 60.0  # s for the first worker to join
@@ -177,8 +178,6 @@ def evaluate_chunk(package: bytes, path: str, index: int) -> int:
     Returns:
         The number of its postures.
     """
-    from copsense.maps.mapping import write_chunk
-
     if not Path(path).exists():
         raise SchedulerError(
             f"the worker on {socket.gethostname()} does not see the store {path}, into which it "

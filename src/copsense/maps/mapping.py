@@ -14,12 +14,13 @@ import xarray as xr
 from copsense.arrays import whole_number
 from copsense.criterion import Criterion
 from copsense.limits import Limits
+from copsense.maps.cluster import connect, evaluate_there
 from copsense.maps.evaluation import ChunkEvaluator
 from copsense.maps.plan import MapPlan
-from copsense.maps.reduction import reduce_chunk
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore, check_store, create_map, open_map
 from copsense.maps.summary import MapSummary, summarise
+from copsense.maps.writing import write_chunk
 from copsense.stance import Stance
 
 Progress = Callable[[int], object]
@@ -73,8 +74,28 @@ def map_postures(
         SchedulerError: the scheduler or its workers cannot be reached, or gave up.
         MissingExtraError: Zarr or Dask is not installed.
     """
+    store = fill_map(
+        MapPlan(stance, tuple(criteria), sampling, limits, chunk, configurations),
+        path,
+        threads=threads,
+        scheduler=scheduler,
+        workers=workers,
+        progress=progress,
+    )
+    return summarise(store)
+
+
+def fill_map(
+    plan: MapPlan,
+    path: str | Path,
+    *,
+    threads: int = 1,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> MapStore:
+    """Evaluate what is missing of a plan's map; see `map_postures`."""
     threads = whole_number(threads, "threads")
-    plan = MapPlan(stance, tuple(criteria), sampling, limits, chunk, configurations)
     where = check_store(path)
     evaluator = ChunkEvaluator(plan)
     report: Progress = progress or (lambda _: None)
@@ -82,21 +103,23 @@ def map_postures(
         store = create_map(where, plan)
         _evaluate_here(evaluator, store, _pending(plan, store, report), threads, report)
     else:
-        from copsense.maps.cluster import connect, evaluate_there
-
         with connect(scheduler, workers) as client:
             store = create_map(where, plan)
             evaluate_there(client, plan, store, _pending(plan, store, report), report)
-    return summarise(store)
+    return store
 
 
-def map_summary(path: str | Path) -> MapSummary:
+def map_summary(path: str | Path, progress: Progress | None = None) -> MapSummary:
     """What the map at a path comes to, as far as it is done.
+
+    Args:
+        path: of the store.
+        progress: called with the number of postures read since; each is read twice.
 
     Raises:
         OutputError: there is no map of copsense.
     """
-    return summarise(open_map(path))
+    return summarise(open_map(path), progress)
 
 
 def load_map(path: str | Path) -> xr.Dataset:
@@ -145,12 +168,6 @@ def _evaluate_here(
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-
-
-def write_chunk(evaluator: ChunkEvaluator, store: MapStore, index: int) -> None:
-    """Evaluate a chunk and write it, mark and all."""
-    found = evaluator.evaluate(index)
-    store.write(index, found, reduce_chunk(found, evaluator.plan.bounds(index)[0]))
 
 
 def _size(plan: MapPlan, index: int) -> int:

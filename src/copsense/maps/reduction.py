@@ -6,7 +6,7 @@ map that was stopped, resumed, or shared among machines reduces to the same bits
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +16,7 @@ from copsense.maps.columns import EVALUATED, STATUS
 from copsense.maps.evaluation import Chunk
 
 WORST = 10  # postures of each chunk, and of the map, that are kept by name
+_HALF = 1 << 16  # values of half a key
 # column -> sign that puts the worst first in ascending order
 QUANTITIES = {"least_com_travel": 1.0, "largest_com_gain": -1.0}
 
@@ -50,15 +51,15 @@ def reduce_chunk(chunk: Chunk, start: int) -> Part:
     return Part(counts, np.array(worst, dtype=np.int64), np.array(values, dtype=np.float32))
 
 
-def fold(one: Part, other: Part) -> Part:
-    """Both parts together."""
-    postures = np.concatenate([one.worst, other.worst], axis=-1)
-    values = np.concatenate([one.values, other.values], axis=-1)
-    worst, kept = np.empty_like(one.worst), np.empty_like(one.values)
+def fold(parts: Sequence[Part]) -> Part:
+    """Parts together."""
+    postures = np.concatenate([part.worst for part in parts], axis=-1)
+    values = np.concatenate([part.values for part in parts], axis=-1)
+    worst, kept = np.empty_like(parts[0].worst), np.empty_like(parts[0].values)
     for i, name in enumerate(QUANTITIES):
         for j in range(worst.shape[1]):
             worst[i, j], kept[i, j] = _first(name, postures[i, j], values[i, j])
-    return Part(one.counts + other.counts, worst, kept)
+    return Part(np.sum([part.counts for part in parts], axis=0), worst, kept)
 
 
 def _first(name: str, postures: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -74,42 +75,67 @@ def _first(name: str, postures: np.ndarray, values: np.ndarray) -> tuple[np.ndar
     return best, kept
 
 
-def percentiles(
-    chunks: Callable[[], Iterable[np.ndarray]], levels: Sequence[float]
-) -> Float[np.ndarray, " p"]:
-    """Exact percentiles of float32 numbers that are read chunk by chunk, twice.
+class Percentiles:
+    """Exact percentiles of float32 columns that are read block by block, twice.
 
     The first reading counts by the upper 16 bits of an order-preserving key, the second by the
     lower 16 bits where a percentile falls: half a megabyte a percentile, however many the numbers.
 
     Args:
-        chunks: gives the numbers from the start each time; NaN is passed over.
+        columns: how many.
         levels: in percent.
-
-    Returns:
-        The smallest number that at least this share does not exceed (no interpolation); NaN where
-        there is none.
     """
-    upper = np.zeros(1 << 16, dtype=np.int64)
-    for values in chunks():
-        upper += np.bincount(_keys(values) >> 16, minlength=1 << 16)
-    total = int(upper.sum())
-    if not total:
-        return np.full(len(levels), np.nan)
-    ranks = np.array([max(int(np.ceil(level / 100 * total)), 1) for level in levels])
-    cumulative = np.cumsum(upper)
-    high = np.searchsorted(cumulative, ranks)
-    lower = {int(h): np.zeros(1 << 16, dtype=np.int64) for h in high}
-    for values in chunks():
-        keys = _keys(values)
-        for h, counts in lower.items():
-            counts += np.bincount(keys[keys >> 16 == h] & 0xFFFF, minlength=1 << 16)
-    found = [
-        (int(h) << 16)
-        + int(np.searchsorted(np.cumsum(lower[int(h)]), rank - cumulative[h] + upper[h]))
-        for h, rank in zip(high, ranks, strict=True)
-    ]
-    return _values(np.array(found, dtype=np.uint32))
+
+    def __init__(self, columns: int, levels: Sequence[float]) -> None:
+        """Nothing is read."""
+        self._levels = levels
+        self._upper = np.zeros((columns, _HALF), dtype=np.int64)
+        self._lower: list[dict[int, np.ndarray]] | None = None
+
+    def count(self, block: Float[np.ndarray, "n m"]) -> None:
+        """Take a block of the first reading; NaN is passed over."""
+        for upper, values in zip(self._upper, block.T, strict=True):
+            upper += np.bincount(_keys(values) >> 16, minlength=_HALF)
+
+    def refine(self, block: Float[np.ndarray, "n m"]) -> None:
+        """Take a block of the second reading."""
+        if self._lower is None:
+            self._lower = [
+                {int(h): np.zeros(_HALF, dtype=np.int64) for h in self._high(upper)[0]}
+                for upper in self._upper
+            ]
+        for lower, values in zip(self._lower, block.T, strict=True):
+            keys = _keys(values)
+            for high, counts in lower.items():
+                counts += np.bincount(keys[keys >> 16 == high] & 0xFFFF, minlength=_HALF)
+
+    def found(self) -> Float[np.ndarray, "m p"]:
+        """The smallest numbers that at least these shares do not exceed (no interpolation).
+
+        NaN where a column has no number.
+        """
+        rows = []
+        for upper, lower in zip(self._upper, self._lower or [], strict=False):
+            keys = [
+                (int(h) << 16) + int(np.searchsorted(np.cumsum(lower[int(h)]), rank))
+                for h, rank in zip(*self._high(upper), strict=True)
+            ]
+            rows.append(_values(np.array(keys, dtype=np.uint32)) if keys else self._nothing)
+        return np.array(rows or [self._nothing] * len(self._upper))
+
+    @property
+    def _nothing(self) -> np.ndarray:
+        return np.full(len(self._levels), np.nan)
+
+    def _high(self, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Upper half of the key of each percentile, and its rank among those that share it."""
+        total = int(upper.sum())
+        if not total:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        ranks = np.array([max(int(np.ceil(level / 100 * total)), 1) for level in self._levels])
+        cumulative = np.cumsum(upper)
+        high = np.searchsorted(cumulative, ranks)
+        return high, ranks - cumulative[high] + upper[high]
 
 
 def _keys(values: np.ndarray) -> np.ndarray:

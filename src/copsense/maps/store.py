@@ -14,13 +14,14 @@ import os
 import shutil
 import tempfile
 import warnings
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from copsense._version import __version__
 from copsense.errors import CopsenseError, MissingExtraError, OutputError
@@ -99,12 +100,22 @@ class MapStore:
         with self._errors("be read"):
             return np.asarray(self._arrays[column][start:stop])
 
-    def chunks(self, column: str, criterion: int) -> Iterator[np.ndarray]:
-        """A column of the postures that were evaluated, for one criterion, chunk by chunk."""
-        for i in np.flatnonzero(self.done()):
-            start, stop = self.bounds(int(i))
-            status = self.read("status", start, stop)[:, criterion]
-            yield self.read(column, start, stop)[:, criterion][status == EVALUATED]
+    def runs(self, rows: int = 1 << 17) -> Iterator[tuple[int, int]]:
+        """Chunks that are done, as runs [first, end) of about so many rows: read as one each."""
+        most = max(rows // self._size, 1)
+        marks = np.concatenate([[0], self.done().astype(np.int8), [0]])
+        starts, ends = (np.flatnonzero(np.diff(marks) == way).tolist() for way in (1, -1))
+        for start, end in zip(starts, ends, strict=True):
+            yield from ((i, min(i + most, end)) for i in range(start, end, most))
+
+    def evaluated(
+        self, columns: Sequence[str], first: int, end: int
+    ) -> Float[np.ndarray, "n nq nk"]:
+        """Columns over a run of chunks; NaN where a posture was not evaluated."""
+        start, stop = self.bounds(first)[0], self.bounds(end - 1)[1]
+        known = self.read("status", start, stop) == EVALUATED
+        rows = [np.where(known, self.read(name, start, stop), np.nan) for name in columns]
+        return np.stack(rows, axis=1)
 
     def write(self, index: int, chunk: Chunk, part: Part) -> None:
         """Write a chunk; its mark comes last, so a chunk that is marked is whole.
@@ -121,10 +132,11 @@ class MapStore:
                 self._parts[name][index] = getattr(part, name)
             self._arrays["done"][index] = 1
 
-    def part(self, index: int) -> Part:
-        """What a chunk contributes to the reductions."""
+    def parts(self, first: int, end: int) -> list[Part]:
+        """What each chunk of a run contributes to the reductions."""
         with self._errors("be read"):
-            return Part(*(np.asarray(self._parts[n][index]) for n in ("counts", "worst", "values")))
+            read = [np.asarray(self._parts[n][first:end]) for n in ("counts", "worst", "values")]
+        return [Part(*arrays) for arrays in zip(*read, strict=True)]
 
     @contextmanager
     def _errors(self, verb: str) -> Iterator[None]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from copsense.maps.columns import EVALUATED, STATUS
-from copsense.maps.reduction import QUANTITIES, Part, fold, percentiles
+from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
 from copsense.maps.store import MapStore
 
 LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
@@ -96,34 +96,44 @@ class MapSummary:
         return self.chunks_done == self.chunks
 
 
-def summarise(store: MapStore) -> MapSummary:
-    """Fold the parts of the chunks that are done, in their order."""
-    done = store.done()
+def summarise(store: MapStore, progress: Callable[[int], object] | None = None) -> MapSummary:
+    """Fold the parts of the chunks that are done, and read their quantities twice.
+
+    Args:
+        store: the map.
+        progress: called with the number of postures read since; each is read twice.
+    """
+    report = progress or (lambda _: None)
     total: Part | None = None
     first: dict[tuple[int, int], int] = {}  # chunk with the first posture of a status
-    for i in np.flatnonzero(done):
-        part = store.part(int(i))
-        for j, code in np.argwhere(part.counts > 0):
-            first.setdefault((int(j), int(code)), int(i))
-        total = part if total is None else fold(total, part)
+    shares = Percentiles(len(QUANTITIES) * len(store.criteria), LEVELS)
+    runs = list(store.runs())
+    for start, end in runs:
+        parts = store.parts(start, end)
+        for i, part in enumerate(parts, start):
+            for j, code in np.argwhere(part.counts > 0):
+                first.setdefault((int(j), int(code)), i)
+        total = fold(parts if total is None else [total, *parts])
+        report(_rows(store, start, end, shares.count))
+    for start, end in runs:
+        report(_rows(store, start, end, shares.refine))
+    levels = shares.found().reshape(len(QUANTITIES), len(store.criteria), len(LEVELS))
     criteria = {}
     for j, criterion in enumerate(store.criteria):
-        shares: dict[str, dict[float, float]] = {}
-        worst: dict[str, tuple[WorstPosture, ...]] = {}
-        for k, name in enumerate(QUANTITIES):
-            found = percentiles(lambda n=name, c=j: store.chunks(n, c), LEVELS)  # type: ignore[misc]
-            shares[name] = dict(zip(LEVELS, found.tolist(), strict=True))
-            worst[name] = ()
-            if total is not None:
+        worst: dict[str, tuple[WorstPosture, ...]] = dict.fromkeys(QUANTITIES, ())
+        counts = np.zeros(len(STATUS), int)
+        if total is not None:
+            counts = total.counts[j]
+            for k, name in enumerate(QUANTITIES):
                 rows = zip(total.worst[k, j], total.values[k, j], strict=True)
                 worst[name] = tuple(_posture(store, int(p), float(v)) for p, v in rows if p >= 0)
-        counts = np.zeros(len(STATUS), int) if total is None else total.counts[j]
+        travel, gain = (dict(zip(LEVELS, row.tolist(), strict=True)) for row in levels[:, j])
         criteria[criterion] = CriterionSummary(
             dict(zip(STATUS, counts.tolist(), strict=True)),
             worst["least_com_travel"],
             worst["largest_com_gain"],
-            shares["least_com_travel"],
-            shares["largest_com_gain"],
+            travel,
+            gain,
             {
                 STATUS[code]: _failed(store, chunk, j, code)
                 for (column, code), chunk in sorted(first.items())
@@ -136,10 +146,17 @@ def summarise(store: MapStore) -> MapSummary:
         store.names,
         tuple(store.units(name) for name in store.coordinates),
         len(store),
-        len(done),
-        int(done.sum()),
+        len(store.done()),
+        sum(end - start for start, end in runs),
         criteria,
     )
+
+
+def _rows(store: MapStore, first: int, end: int, take: Callable[[np.ndarray], object]) -> int:
+    """Hand on the quantities over a run of chunks, a column each of criterion and quantity."""
+    block = store.evaluated(tuple(QUANTITIES), first, end)
+    take(block.reshape(len(block), -1))
+    return len(block)
 
 
 def _posture(store: MapStore, row: int, value: float) -> WorstPosture:

@@ -36,7 +36,7 @@ from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
 from copsense.paper.lateral import LateralSweep, Series
 from copsense.paper.linkage import Hand
 from copsense.paper.printed import PRINTED_FORMS, PrintedForm
-from copsense.paper.sway import Stretch, Sway, completed, stretch, tip_travel
+from copsense.paper.sway import Stretch, Sway, completed, stretch, tip_travel, tracking_error
 from copsense.paper.sway_claims import SWAY_CLAIMS, evaluate_sway_claims
 
 __all__ = [
@@ -84,4 +84,5 @@ __all__ = [
     "solve_four_bar_member",
     "stretch",
     "tip_travel",
+    "tracking_error",
 ]

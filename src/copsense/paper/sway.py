@@ -10,6 +10,8 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
+from copsense.limits import Limits
+
 _SETTLED = 0.5  # s until the sine, which starts at full speed, is followed
 
 
@@ -62,6 +64,7 @@ class Sway:
     right: xr.Dataset
     torque: xr.Dataset
     limited: Mapping[str, xr.Dataset]
+    limits: Limits
 
     @cached_property
     def wrench_stretches(self) -> tuple[Stretch, Stretch]:
@@ -106,6 +109,14 @@ def stretch(recording: xr.Dataset) -> Stretch:
         np.stack([np.interp(com_y, travel, foot) for foot in static.T], axis=1),
         standing["margin"].values[:, order],
     )
+
+
+def tracking_error(recording: xr.Dataset) -> float:
+    """Root mean square of CoM y minus its target until a foot tips, from the very start [m]."""
+    tip = float(recording.attrs["tip_time"])
+    stood = recording.sel(time=slice(None, tip if np.isfinite(tip) else None))
+    error = (stood["com"] - stood["com_target"]).sel(com_axis="y")
+    return float(np.sqrt((error**2).mean()))
 
 
 def completed(recording: xr.Dataset) -> bool:

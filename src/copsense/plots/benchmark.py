@@ -29,7 +29,11 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
     colour = colours(dict.fromkeys(table["controller"]))
     found = agreement(table)
     compared = list(dict.fromkeys(found["score"]))
-    groups = list(table.groupby(["trial", "score"], sort=False))
+    groups = [
+        (key, rows)
+        for key, rows in table.groupby(["trial", "score"], sort=False)
+        if not (rows["status"] == "none").all()  # as point feet have no margin
+    ]
     top = math.ceil(len(compared) / _ACROSS)
     tall = [_height(rows, colour) for _, rows in groups]
     pairs = [tall[i : i + _ACROSS] for i in range(0, len(tall), _ACROSS)]
@@ -133,7 +137,7 @@ def _draw_bars(
     step = 0.8 / len(names)
     known = rows[["value", "low", "high", "predicted"]].to_numpy(float)
     known = known[np.isfinite(known)] * factor
-    longest = max(float(known.max(initial=0.0)), 1e-12)
+    longest = float(known.max(initial=0.0)) or 1.0
     for i, key in enumerate(settings):
         here = rows[(rows[_SETTING] == list(key)).all(axis=1)].set_index("controller")
         for j, name in enumerate(names):
@@ -166,6 +170,8 @@ def _draw_bars(
     ax.set_xlim(min(0.0, 1.08 * least), 1.12 * longest)
     ax.grid(visible=False, axis="y")
     ax.set_xlabel(f"{_words(score)} [{unit}]")
+    if not len(known):
+        ax.set_xticks([])
     ax.set_title(trial if len(trial) < 40 else trial[:38] + "...")
 
 

@@ -12,7 +12,7 @@ from jinja2 import Environment, StrictUndefined
 from copsense.binding import LimitChange
 from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
 from copsense.report.figure import ReportFigure
-from copsense.report.sway import lean_rows, lean_words, sway_differences, sway_runs
+from copsense.report.sway import score_rows, score_words, sway_differences, sway_runs
 from copsense.report.typesetting import typeset
 from copsense.report.words import commands, differs, limit_words, limits, summary
 from copsense.reproduction import Reproduction
@@ -80,8 +80,8 @@ def render_page(
         limit_words=limit_words(reproduction.within_limits.limits),
         bindings=[_binding(b) for b in reproduction.within_limits.bindings],
         sway_runs=sway_runs(reproduction.sway) if reproduction.sway else [],
-        leans=[] if reproduction.leans is None else lean_rows(reproduction.leans),
-        lean_words="" if reproduction.leans is None else lean_words(reproduction.leans),
+        scores=[] if reproduction.benchmark is None else score_rows(reproduction.benchmark),
+        score_words=() if reproduction.benchmark is None else score_words(reproduction.benchmark),
         sway_differences=sway_differences(reproduction.sway) if reproduction.sway else (),
     )
 

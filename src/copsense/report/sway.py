@@ -6,11 +6,12 @@ import math
 
 import pandas as pd
 
-from copsense.benchmark import CAVEAT, agreement
-from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel
+from copsense.benchmark import CAVEAT, agreement, rank_scores
+from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel, tracking_error
 from copsense.plots import plot_sway_cop, plot_sway_hip_roll, plot_sway_limits, plot_sway_load
 from copsense.plots.style import Figure
 from copsense.report.figure import ReportFigure
+from copsense.report.words import limit_words
 
 _SECTION = "closed-loop"
 
@@ -23,6 +24,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
     reach = sway.limited_amplitude * 1e3
     own = found["loop-less-on-support"].number
     off = found["loop-quasi-static"].number * 1e3
+    left = float(sway.wrench_stretches[0].margin.min())
     return (
         ReportFigure(
             "loop_6a",
@@ -45,8 +47,9 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "loop_7a",
             _SECTION,
             "Fig. 7a in closed loop, minimum wrench, to the left.",
-            "Both CoPs move with the CoM until one is at its sole's edge and the foot tips, at "
-            f"{_mm(tips[0])} of CoM travel. The sine starts at full speed: for the first half "
+            f"Both CoPs move with the CoM until the foot tips, at {_mm(tips[0])} of CoM travel and "
+            f"with {left * 1e3:.1f} mm to its sole's edge: the mesh's rounded edge rolls a little "
+            "before. The sine starts at full speed: for the first half "
             "second the controller catches up.",
             "CoP y of both feet against time, parallel, until the right foot tips.",
             lambda: _figure(plot_sway_cop(sway.left)),
@@ -89,8 +92,10 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             _SECTION,
             f"Within limits, ±{reach:g} mm.",
             "With inequalities in the controller the CoM goes from over one foot to over the "
-            "other: each CoP stops short of its edge, and the other foot carries the rest. Dotted: "
-            "the edges level with the foot's origin; a CoP that moves fore or aft has others.",
+            "other: each CoP stops short of its edge, and the other foot carries the rest. "
+            f"Limits: {limit_words(sway.limits)}; nearer to the edge a mesh's rounded sole rolls. "
+            "Dotted: the edges level with the foot's origin; a CoP that moves fore or aft has "
+            "others.",
             "CoP y of both feet against time, one panel per criterion, flat near the soles' edges.",
             lambda: plot_sway_limits(sway.limited),
             shape="wide",
@@ -103,7 +108,6 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
     rows = []
     for name, run in sway.runs.items():
         stood = stretch(run)
-        error = math.sqrt(float((stood.error**2).mean()))
         static = float(run.attrs["static_excursion"])
         limited = name not in ("minimum torque",) and "limits" in name
         rows.append(
@@ -117,45 +121,48 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
                 else str(run.attrs["end_reason"]),
                 "tip": _mm(tip_travel(run) * 1e3, sign=True),
                 "static": "held by the limits" if limited else _mm(static * 1e3, sign=True),
-                "error": f"{error * 1e3:.4f} mm",
+                "error": f"{tracking_error(run) * 1e3:.3f} mm",
                 "margin": f"{float(stood.margin.min()) * 1e3:.2f} mm",
             }
         )
     return rows
 
 
-def lean_rows(leans: pd.DataFrame) -> list[dict[str, str]]:
-    """A row for each lean: where a foot tipped, and where it should have."""
+def score_rows(table: pd.DataFrame) -> list[dict[str, str]]:
+    """A row for each score: simulated, predicted, and the controller's rank."""
+    ranks = rank_scores(table)["rank"].reindex(table.index)
     return [
         {
+            "score": f"{row['trial']}: {str(row['score']).replace('_', ' ')}",
             "posture": str(row["posture"]),
             "controller": str(row["controller"]),
-            "tip": _mm(float(row["value"]) * 1e3)
+            "value": _quantity(float(row["value"]), row["unit"])
             if row["status"] == "measured"
-            else str(row["reason"]),
-            "path": _mm(float(row["predicted"]) * 1e3),
-            "first_order": _mm(float(row["first_order"]) * 1e3),
-            "contact": str(row["contact"]),
+            else f"{row['status']}: {row['reason']}",
+            "path": _quantity(float(row["predicted"]), row["unit"]),
+            "first_order": _quantity(float(row["first_order"]), row["unit"]),
+            "contact": str(row["contact"]) or "–",
+            "rank": "–" if math.isnan(rank) else f"{rank:.0f}",
         }
-        for _, row in leans[leans["score"] == "tip_excursion"].iterrows()
+        for (_, row), rank in zip(table.iterrows(), ranks, strict=True)
     ]
 
 
-def lean_words(leans: pd.DataFrame) -> str:
-    """How well the predictions hold, with the caveat."""
-    found = agreement(leans)
+def score_words(table: pd.DataFrame) -> tuple[str, ...]:
+    """How well the predictions hold, a line per score, and the caveat."""
     words = []
-    for _, row in found[found["score"] == "tip_excursion"].iterrows():
-        between = (
-            f", r = {row['correlation']:.4f} (95 % interval {row['low']:.4f} to {row['high']:.4f})"
-            if math.isfinite(row["correlation"])
-            else ""
-        )
+    for _, row in agreement(table).iterrows():
+        name = "along the path" if row["prediction"] == "path" else "to first order"
+        r = ""
+        if math.isfinite(row["low"]):
+            ends = f"{row['low']:.4f} to {row['high']:.4f}"
+            r = f", r = {row['correlation']:.4f} (95 % interval {ends})"
         words.append(
-            f"{row['prediction']}: error {row['mean_error'] * 1e3:.2f} mm on average, "
-            f"{row['largest_error'] * 1e3:.2f} mm at most{between}, {row['cases']} cases"
+            f"{str(row['score']).replace('_', ' ')}, {name}: error "
+            f"{_quantity(row['mean_error'], row['unit'])} on average, "
+            f"{_quantity(row['largest_error'], row['unit'])} at most{r}, {row['cases']} cases"
         )
-    return "; ".join(words) + f". {CAVEAT}"
+    return (*words, CAVEAT)
 
 
 def sway_differences(sway: Sway) -> tuple[str, ...]:
@@ -170,6 +177,12 @@ def sway_differences(sway: Sway) -> tuple[str, ...]:
         "The null space of Eq. (20) is weighted with the inertia; with the Moore-Penrose inverse "
         "that the paper prints, light joints take everything.",
     )
+
+
+def _quantity(value: float, unit: str) -> str:
+    if not math.isfinite(value):
+        return "–"
+    return f"{value * 1e3:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
 
 
 def _mm(value: float, *, sign: bool = False) -> str:

@@ -134,10 +134,21 @@ def limits(reproduction: Reproduction) -> tuple[str, ...]:
 def _balance_commands(sway: Sway | None) -> tuple[str, ...]:
     if sway is None:
         return ()
-    sine = f"--reference sine:{sway.amplitude:g}:{sway.frequency:g}"
-    return tuple(
-        f"copsense balance icub --criterion {name} {sine} --output {name}.nc --plot {name}.png"
-        for name in ("minimum-wrench", "minimum-torque")
+    narrow, wide = sway.amplitude, sway.limited_amplitude
+    within = limits_option(sway.limits)
+    runs = [
+        ("minimum-wrench", narrow, "", ""),
+        ("minimum-wrench", -narrow, "_right", ""),
+        ("minimum-torque", narrow, "", ""),
+        *((name, wide, "_within", f" --limits {within}") for name in sway.limited),
+    ]
+    return (
+        *(
+            f"copsense balance icub --criterion {name} --reference sine:{amplitude:g}:"
+            f"{sway.frequency:g}{limits} --output {name}{suffix}.nc --plot {name}{suffix}.png"
+            for name, amplitude, suffix, limits in runs
+        ),
+        "copsense benchmark icub --output benchmark.csv --plot benchmark.png",
     )
 
 

@@ -110,8 +110,8 @@ def _write_data(reproduction: Reproduction, folder: Path) -> None:
         for name, recording in reproduction.sway.runs.items():
             plain = re.sub(r"[^a-z]+", "_", name)
             write_recording(recording, folder / f"closed_loop_{plain}.nc")
-    if reproduction.leans is not None:
-        reproduction.leans.to_csv(folder / "leans.csv", index=False)
+    if reproduction.benchmark is not None:
+        reproduction.benchmark.to_csv(folder / "benchmark.csv", index=False)
     _write_json(
         folder / "claims.json",
         [

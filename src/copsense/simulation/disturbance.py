@@ -44,9 +44,15 @@ class Push:
         """Size of force times duration [N s]."""
         return float(np.linalg.norm(self.force)) * self.duration
 
-    def acts(self, time: float) -> bool:
-        """Whether it acts at a time [s]."""
-        return self.start <= time < self.start + self.duration
+    def share(self, time: float, step: float) -> float:
+        """Share of a step from a time on in which it acts: what is given is its whole impulse.
+
+        Args:
+            time: [s].
+            step: [s].
+        """
+        end = min(time + step, self.start + self.duration)
+        return round(max(0.0, end - max(time, self.start)) / step, 9)
 
 
 @dataclass(frozen=True)

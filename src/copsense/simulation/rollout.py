@@ -42,6 +42,7 @@ def rollout(
     record_period: float = 5e-3,
     thresholds: Thresholds | None = None,
     progress: Callable[[int], object] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> xr.Dataset:
     """Run a scenario in closed loop.
 
@@ -54,6 +55,7 @@ def rollout(
         record_period: time between two rows of the record [s], rounded to control periods.
         thresholds: what counts as a tip or a fall.
         progress: called with the number of control periods done since the last call.
+        stop: asked before every control period; true ends the run.
 
     Returns:
         A dataset over ``time`` with centre of mass, wrenches (measured and commanded), CoPs,
@@ -77,6 +79,7 @@ def rollout(
             record_period,
             thresholds or Thresholds(),
             progress,
+            stop,
         )
 
 
@@ -88,6 +91,7 @@ def _run(
     record_period: float,
     thresholds: Thresholds,
     progress: Callable[[int], object] | None,
+    stop: Callable[[], bool] | None,
 ) -> xr.Dataset:
     believed, dt = simulator.stance, simulator.time_step
     name, n = controller_name(controller), len(believed.robot.torque_names)
@@ -104,7 +108,7 @@ def _run(
     ground = _alterable(simulator, "a change of friction") if changes else None
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
-    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance)
+    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance, dt)
     watch, recorder = Watch(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
@@ -117,11 +121,16 @@ def _run(
     end = Event("completed", scenario.duration, "completed")
     for number in range(count):
         time = number * scenario.control_period
+        if stop and len(recorder) and stop():
+            end = Event("stopped", time, "stopped")
+            break
         target = reference.at(time)
         while ground is not None and changes and changes[0].start <= time + 1e-9:
             change = changes.popleft()
             ground.set_friction(change.friction, change.contact)
         q, v = sensors.read(now)
+        for seen in (q, v, now.wrenches):  # the controller's to read, not to change
+            seen.setflags(write=False)
         try:
             observation = Observation(time, q, v, target, now.wrenches)
             command = ask(controller, observation, n)
@@ -231,21 +240,21 @@ class _Sensors:
 class _Pushes:
     """Pushes as a generalised force."""
 
-    def __init__(self, scenario: Scenario, stance: Stance) -> None:
-        self._pushes, self._model = scenario.pushes, stance.robot.model
+    def __init__(self, scenario: Scenario, stance: Stance, step: float) -> None:
+        self._step, self._pushes, self._model = step, scenario.pushes, stance.robot.model
         self._data = self._model.createData()
 
     def at(self, now: Snapshot) -> np.ndarray | None:
-        active = [push for push in self._pushes if push.acts(now.time + 1e-9)]
-        if not active:
+        shares = [push.share(now.time, self._step) for push in self._pushes]
+        if not any(shares):
             return None
         total = np.zeros(self._model.nv)
         pin.computeJointJacobians(self._model, self._data, now.q)
         pin.updateFramePlacements(self._model, self._data)
-        for push in active:
+        for push, share in zip(self._pushes, shares, strict=True):
             frame = self._model.getFrameId(push.frame)
             J = pin.getFrameJacobian(
                 self._model, self._data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             )
-            total += J[:3].T @ np.array(push.force)
+            total += share * (J[:3].T @ np.array(push.force))
         return total

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from copsense.arrays import finite_number
+from copsense.arrays import finite_number, whole_number
 from copsense.controllers.target import Hold, PathReference, Signal
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
@@ -51,6 +51,7 @@ class Scenario:
         """Refuse what cannot be run."""
         finite_number(self.duration, "the duration of a scenario [s]", positive=True)
         finite_number(self.control_period, "the control period [s]", positive=True)
+        object.__setattr__(self, "seed", whole_number(self.seed, "the seed", least=0))
         if self.duration > _LONGEST:
             raise InvalidInputError(
                 f"a scenario of {self.duration:g} s cannot be run. Give at most {_LONGEST:g} s."

@@ -44,8 +44,8 @@ class Event:
     """Something that may end a rollout.
 
     Attributes:
-        kind: ``"tip"``, ``"lift"``, ``"slip"``, ``"fall"``, ``"diverged"``, ``"engine"`` or
-            ``"controller"``.
+        kind: ``"tip"``, ``"lift"``, ``"slip"``, ``"fall"``, ``"diverged"``, ``"engine"``,
+            ``"controller"`` or ``"stopped"``.
         time: [s].
         message: what happened, in words.
         contact: the contact concerned, or nothing.

@@ -12,7 +12,7 @@ from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.paper import Sway
 from copsense.simulation import MujocoSimulator, Scenario, rollout
-from copsense.simulation.prediction import predict, predict_lean
+from copsense.simulation.prediction import farther_side, predict, predict_lean
 from copsense.stance import Stance
 
 _RECORD = 0.02  # s between recorded rows
@@ -77,7 +77,7 @@ def sway_in_simulation(
         attached = predict(along, criterion, within).attach(recording)
         if within is None:
             # The sway may turn before a foot would tip, and looks to one side: the lean goes on.
-            side = 1.0 if along.signal.at(0.0)[1] > 0 else -1.0
+            side = farther_side(along.signal)
             lean = predict_lean(stance, criterion, side * _FARTHER * amplitude)
             attached.attrs["static_excursion"] = side * lean.excursion
             attached.attrs["static_first_order"] = side * lean.first_order
@@ -96,4 +96,5 @@ def sway_in_simulation(
             criterion.name: run(f"closed loop: {criterion.name}, limits", criterion, wide, limits)
             for criterion in (wrench, torque)
         },
+        limits,
     )
