@@ -166,8 +166,8 @@ def page(table: pd.DataFrame) -> list[str]:
             | {"contact (predicted)": lambda row: f"{row['contact']} ({row['predicted_contact']})"},
         ),
         "",
-        "A tip is a sole turned by 0.5 degrees, which comes a little after its CoP reaches the "
-        "edge.",
+        "A tip is a sole turned by 0.5 degrees: a little after its CoP reaches the edge of a "
+        "rectangular sole, a little before it reaches a mesh's rounded one (talos).",
         "",
         "## The first push that tips a foot (50 ms, to the left, on the base) [N s]",
         "",

@@ -4,7 +4,7 @@
 
 Installs placo and tsid, each in an environment of its own under build/peers, and lets them balance
 the same robot in the same simulation as copsense's controller, through a pipe (peers_pipe.py). A
-peer that cannot be installed or run is a line with its reason. Takes about fifteen minutes; --quick
+peer that cannot be installed or run is a line with its reason. Takes a few minutes; --quick
 has one posture and no limits.
 """
 

@@ -11,7 +11,15 @@ import pytest
 from standing import C1, C2, Statue, icub, simulator
 
 import copsense
-from copsense.controllers import BalancingController, Gains, Hold, Ramp, Sine, public_gains
+from copsense.controllers import (
+    BalancingController,
+    Gains,
+    Hold,
+    Ramp,
+    Sine,
+    lateral_reference,
+    public_gains,
+)
 from copsense.errors import (
     ControllerError,
     EngineMismatchError,
@@ -124,6 +132,21 @@ def test_a_controller_cannot_change_what_it_sees():
 
     with pytest.raises(ControllerError, match="read-only"):
         rollout(Statue(icub()), meddling, Scenario(0.1))
+
+
+def test_a_controller_and_a_reference_of_another_robot():
+    talos = copsense.load_stance("talos")
+    with pytest.raises(InvalidInputError, match=r"made for 'talos' with 28 joints.*'icub' with 23"):
+        rollout(Statue(icub()), BalancingController(talos, C2), Scenario(0.1))
+    reference = lateral_reference(talos, Sine(0.01, 1.0))
+    with pytest.raises(InvalidInputError, match="the reference is made for 'talos'"):
+        rollout(Statue(icub()), zero, Scenario(0.1, reference))
+
+
+@pytest.mark.parametrize("period", [0.0, -1.0, np.nan])
+def test_a_record_period_that_is_none(period):
+    with pytest.raises(InvalidInputError, match="between two rows"):
+        rollout(Statue(icub()), zero, Scenario(0.1), record_period=period)
 
 
 def test_a_run_that_is_told_to_stop_keeps_what_it_has():

@@ -12,6 +12,7 @@ import pinocchio as pin
 import xarray as xr
 from threadpoolctl import threadpool_limits
 
+from copsense.arrays import finite_number
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, lateral_reference
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
@@ -67,6 +68,7 @@ def rollout(
         CopsenseError: the scenario does not fit the robot or the simulator.
         ControllerError: the controller failed before anything could be recorded.
     """
+    finite_number(record_period, "the time between two rows [s]", positive=True)
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
     # The matrices of a step are small: more BLAS threads than one make it many times slower.
@@ -100,6 +102,10 @@ def _run(
     reference = scenario.reference
     if not isinstance(reference, PathReference):
         reference = lateral_reference(believed, reference)
+    _check_same_robot(believed, reference.path.stances[0], "the reference")
+    made_for = getattr(controller, "stance", None)
+    if isinstance(made_for, Stance):
+        _check_same_robot(believed, made_for, f"controller {name!r}")
     if scenario.model_error:
         simulator = _alterable(simulator, "a model error").altered(
             scenario.model_error.applied(believed)
@@ -189,6 +195,15 @@ def _alterable(simulator: Simulator, what: str) -> AlterableSimulator:
             "set_friction(). Use MujocoSimulator, or leave it out of the scenario."
         )
     return simulator
+
+
+def _check_same_robot(here: Stance, there: Stance, what: str) -> None:
+    ours, theirs = here.robot.joint_names, there.robot.joint_names
+    if ours != theirs:
+        raise InvalidInputError(
+            f"{what} is made for {there.robot.name!r} with {len(theirs)} joints, the simulator is "
+            f"of {here.robot.name!r} with {len(ours)}. Make both of one stance."
+        )
 
 
 class _Sensors:
