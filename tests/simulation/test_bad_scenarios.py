@@ -232,6 +232,8 @@ def test_robots_that_cannot_be_simulated():
     bare = [replace(contact, polygon=None) for contact in icub().contacts]
     with pytest.raises(InvalidInputError, match="no sole"):
         MujocoSimulator(icub().with_contacts(bare))
+    with pytest.raises(InvalidInputError, match=r"A \+ B >= C of the link behind.*RShoulderYaw"):
+        MujocoSimulator(copsense.load_stance("romeo"))
 
 
 def test_an_engine_that_sees_another_robot():
