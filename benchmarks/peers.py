@@ -425,8 +425,6 @@ def main() -> None:
             "",
             *sways,
             "",
-            "The error includes the start: the target sets off at full speed, the robot at rest.",
-            "",
             "## A sway of 70 mm to either side, 0.05 Hz, one period, within limits",
             "",
             *within,

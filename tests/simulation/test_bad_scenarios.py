@@ -13,6 +13,7 @@ from standing import C1, C2, Statue, icub, simulator
 import copsense
 from copsense.controllers import (
     BalancingController,
+    Command,
     Gains,
     Hold,
     Ramp,
@@ -30,6 +31,7 @@ from copsense.errors import (
     UnreachablePostureError,
 )
 from copsense.simulation import (
+    FrictionChange,
     Motors,
     MujocoSimulator,
     Noise,
@@ -87,6 +89,14 @@ def test_an_engine_that_would_start_over_stops(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir()), "the engine's log file"
 
 
+def test_an_engine_does_not_start_over_in_silence():
+    engine = simulator()
+    engine.reset()
+    torques = np.full(N, 1e12)
+    with pytest.raises(SimulatorStoppedError, match="MuJoCo gave up"):
+        list(map(engine.step, [torques] * 50))
+
+
 def test_a_stopped_simulator_leaves_the_record():
     recording = rollout(Statue(icub(), stops_at=0.03), zero, Scenario(0.1))
     assert recording.attrs["end_kind"] == "engine"
@@ -123,6 +133,26 @@ def test_a_controller_that_raises(kind):
 
     with pytest.raises(ControllerError, match=r"'broken' at 0.000 s raised.*out of ideas"):
         rollout(Statue(icub()), broken, Scenario(0.1))
+
+
+@pytest.mark.parametrize("wrenches", [np.zeros((3, 6)), np.full((2, 6), np.nan)])
+def test_a_command_with_wrenches_that_are_none(wrenches):
+    with pytest.raises(ControllerError, match=r"at 0.000 s: the wrenches of the command"):
+        rollout(Statue(icub()), lambda o: Command(np.zeros(N), wrenches), Scenario(0.1))
+
+
+def test_a_controller_may_fill_the_same_array_again():
+    filled = np.zeros(N)
+
+    def thrifty(observation):
+        filled[:] = observation.time
+        return filled
+
+    pretended = Statue(icub())
+    recording = rollout(pretended, thrifty, Scenario(0.1, motors=Motors(delay=0.01)))
+    command = recording["torque_command"].values[:, 0]
+    assert command == pytest.approx(recording["time"].values)
+    assert np.array(pretended.torques)[50, 0] == pytest.approx(0.04)
 
 
 def test_a_controller_cannot_change_what_it_sees():
@@ -195,6 +225,8 @@ def test_a_scenario_that_does_not_fit_the_robot(scenario, error):
         lambda: Scenario(np.nan),
         lambda: Scenario(1e9),
         lambda: Scenario(seed=-3),
+        lambda: Scenario(0.5, pushes=(Push((1.0, 0.0, 0.0), start=0.5),)),
+        lambda: Scenario(0.5, friction=(FrictionChange(0.3, 0.7),)),
         lambda: Scenario(1.0, control_period=0.0),
         lambda: Sine(0.01, 0.0),
         lambda: Sine(np.inf, 1.0),
@@ -232,6 +264,8 @@ def test_robots_that_cannot_be_simulated():
     bare = [replace(contact, polygon=None) for contact in icub().contacts]
     with pytest.raises(InvalidInputError, match="no sole"):
         MujocoSimulator(icub().with_contacts(bare))
+    with pytest.raises(InvalidInputError, match=r"A \+ B >= C of the link behind.*RShoulderYaw"):
+        MujocoSimulator(copsense.load_stance("romeo"))
 
 
 def test_an_engine_that_sees_another_robot():

@@ -146,7 +146,7 @@ def test_a_robot_stands_on_odometry_with_soft_gains(foot):
 
 @pytest.mark.parametrize("foot", ["l_sole", "r_sole", "loaded"])
 def test_stiff_gains_stand_odometry_that_begins_when_the_robot_stands(foot):
-    # The sine starts with a jump of the velocity asked for, while the feet are hardly loaded.
+    # The sine and the robot start at full speed, while the feet are hardly loaded.
     push = (Push((0.0, 8.0, 0.0), 0.2, 0.05),)
     for side in (1, -1):
         sway = Sine(side * 0.01, 0.5)

@@ -124,7 +124,7 @@ class PushToTip:
 class Sway:
     """A sinusoidal lateral sway, the same motion for every controller.
 
-    The first second (a fifth, where it is short) is not scored: it starts with a jump in velocity.
+    The first 0.1 s (a fifth, where it is shorter) is not scored: the ground takes up the weight.
 
     Attributes:
         amplitude: of CoM y [m]; a negative one starts to the right.

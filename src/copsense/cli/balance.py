@@ -125,6 +125,11 @@ def balance(
 
         check_output(video, suffixes=(".mp4",), overwrite=force)
         check_video()
+    if controller is not None and limits is not None and not criteria:
+        raise InvalidInputError(
+            "--limits are those of the built-in controller and of the static prediction. Leave "
+            "them out, or name the --criterion that your controller is to be predicted by."
+        )
     (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
     signal, natural = read_signal(reference)
     scenario = Scenario(
@@ -238,7 +243,8 @@ def _summary(recording: Any) -> dict[str, Any]:
 def _print(summary: dict[str, Any], written: list[str]) -> None:
     end, tip, static = summary["end"], summary["first_tip"], summary["static_prediction"]
     click.echo(
-        f"{summary['robot']} under {summary['controller']}: {end['reason']}, {end['time']:.2f} s"
+        f"{summary['robot']} under {summary['controller']}: {end['reason'].rstrip('.')}, "
+        f"{end['time']:.2f} s"
     )
     click.echo(
         f"  CoM y error {summary['com_error_rms'] * 1e3:.3f} mm rms, "

@@ -94,11 +94,26 @@ def ask(
         ) from error
     torques: Any = answer.torques if isinstance(answer, Command) else answer
     wrenches = answer.wrenches if isinstance(answer, Command) else None
-    usual = isinstance(torques, np.ndarray) and torques.dtype == np.float64
-    if usual and torques.shape == (n,) and np.all(np.isfinite(torques)):  # without a copy
-        return Command(torques, wrenches)
     try:
-        checked = finite_array(torques, "what it returned", (n,), "a torque per joint [Nm]")
+        # Copies: a controller may fill the same array again.
+        return Command(
+            _own(torques, "what it returned", (n,), "a torque per joint [Nm]"),
+            None
+            if wrenches is None
+            else _own(
+                wrenches,
+                "the wrenches of the command",
+                observation.wrenches.shape,
+                "a row per contact, force first [N, Nm]",
+            ),
+        )
     except InvalidInputError as error:
         raise ControllerError(f"{when}: {error}") from None
-    return Command(checked, wrenches)
+
+
+def _own(values: Any, what: str, shape: tuple[int, ...], meaning: str) -> np.ndarray:
+    """A finite array of one's own."""
+    usual = isinstance(values, np.ndarray) and values.dtype == np.float64
+    if usual and values.shape == shape and np.all(np.isfinite(values)):  # the quick way
+        return values.copy()
+    return finite_array(values, what, shape, meaning).copy()

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from copsense.limits import Limits
 
-_SETTLED = 0.5  # s until the sine, which starts at full speed, is followed
+_SETTLED = 0.1  # s until the ground carries the weight evenly
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,6 @@ class Stretch:
     Attributes:
         time: [s].
         com_y: CoM y from where it began [m].
-        error: of CoM y against what was asked for [m].
         load: normal force of each foot as a share of the weight (N, 2), left first.
         cop: CoP y of each foot in its own axes (N, 2) [m].
         static_cop: the same by the static analysis at this CoM [m].
@@ -31,7 +30,6 @@ class Stretch:
 
     time: Float[np.ndarray, " N"]
     com_y: Float[np.ndarray, " N"]
-    error: Float[np.ndarray, " N"]
     load: Float[np.ndarray, "N 2"]
     cop: Float[np.ndarray, "N 2"]
     static_cop: Float[np.ndarray, "N 2"]
@@ -103,7 +101,6 @@ def stretch(recording: xr.Dataset) -> Stretch:
     return Stretch(
         standing["time"].values,
         com_y,
-        (standing["com"] - standing["com_target"]).sel(com_axis="y").values,
         standing["wrench"].sel(component="fz").values[:, order] / recording.attrs["weight"],
         standing["cop"].values[:, order, 1],
         np.stack([np.interp(com_y, travel, foot) for foot in static.T], axis=1),

@@ -26,7 +26,7 @@ from copsense.plots.style import (
 )
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-_SETTLED = 0.5  # s until a sine, which starts at full speed, is followed
+_SETTLED = 0.1  # s until the ground carries the weight evenly
 _TIP: dict[str, Any] = {"color": "#b3261e", "linewidth": 1.1, "linestyle": (0, (4, 2))}
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 

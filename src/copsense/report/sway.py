@@ -49,8 +49,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "Fig. 7a in closed loop, minimum wrench, to the left.",
             f"Both CoPs move with the CoM until the foot tips, at {_mm(tips[0])} of CoM travel and "
             f"with {left * 1e3:.1f} mm to its sole's edge: the mesh's rounded edge rolls a little "
-            "before. The sine starts at full speed: for the first half "
-            "second the controller catches up.",
+            "before.",
             "CoP y of both feet against time, parallel, until the right foot tips.",
             lambda: _figure(plot_sway_cop(sway.left)),
         ),
@@ -75,7 +74,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "loop_9b",
             _SECTION,
             "Fig. 9b in closed loop, CoP of the left foot.",
-            "Against the left hip roll joint, after half a second and until a foot tips; the "
+            "Against the left hip roll joint until a foot tips; the "
             f"static prediction beneath is at most {off:.2f} mm away.",
             "Left CoP against hip roll, both criteria, on top of their static predictions.",
             lambda: _figure(

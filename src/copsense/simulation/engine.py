@@ -98,11 +98,12 @@ class MujocoSimulator:
         """Duration of one step [s]."""
         return self.settings.time_step
 
-    def reset(self) -> Snapshot:
-        """Put the robot at rest at the stance's configuration, time zero."""
+    def reset(self, velocity: Float[np.ndarray, " nv"] | None = None) -> Snapshot:
+        """Put the robot at the stance's configuration, time zero; see `Simulator.reset`."""
         self._mujoco.mj_resetData(self._model, self._data)
         self._model.pair_friction[:] = self._friction
-        self._move(self._stance.q, np.zeros(self._stance.robot.model.nv))
+        still = np.zeros(self._stance.robot.model.nv)
+        self._move(self._stance.q, still if velocity is None else velocity)
         self._mujoco.mj_forward(self._model, self._data)
         # No solution to start from: the same start gives the same run.
         self._data.qacc_warmstart[:] = 0.0

@@ -6,6 +6,7 @@ without a file need no second reading.
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -58,9 +59,13 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     try:
         return spec.compile()
     except ValueError as error:
+        # Its remedies are options of MuJoCo's own files.
+        reason, _, where = str(error).strip().removeprefix("Error: ").partition("\n")
+        named = re.search(r"'body (.+)'", where)
+        link = f" of the link behind joint {named[1]!r}" if named else ""
         raise InvalidInputError(
-            f"MuJoCo cannot simulate robot {robot.name!r}: {str(error).strip().splitlines()[0]}. "
-            "Give its links physical masses and inertias."
+            f"MuJoCo cannot simulate robot {robot.name!r}: {reason.split(';')[0]}{link}. Give its "
+            "links physical masses and inertias."
         ) from None
 
 

@@ -61,6 +61,13 @@ class Scenario:
         changes = self.friction
         changes = (changes,) if isinstance(changes, FrictionChange) else tuple(changes)
         object.__setattr__(self, "friction", tuple(sorted(changes, key=lambda c: c.start)))
+        for what, events in (("push", self.pushes), ("change of friction", self.friction)):
+            for event in events:
+                if event.start >= self.duration:
+                    raise InvalidInputError(
+                        f"a {what} starts at {event.start:g} s, when the scenario of "
+                        f"{self.duration:g} s is over. Make it longer, or begin sooner."
+                    )
         if not hasattr(self.reference, "at"):
             raise InvalidInputError(
                 f"the reference {self.reference!r} is none. Give Hold(), Sine(amplitude, "

@@ -70,8 +70,12 @@ class Simulator(Protocol):
     def time_step(self) -> float:
         """Duration of one step [s]."""
 
-    def reset(self) -> Snapshot:
-        """Put the robot at rest at the stance's configuration, time zero."""
+    def reset(self, velocity: Float[np.ndarray, " nv"] | None = None) -> Snapshot:
+        """Put the robot at the stance's configuration, time zero.
+
+        Args:
+            velocity: what it moves with (nv,); None at rest.
+        """
 
     def step(
         self,

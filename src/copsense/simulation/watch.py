@@ -136,7 +136,7 @@ class Watch:
                 "diverged",
                 now.time,
                 f"the motion diverged: joint {self._joints[fastest]} moves at {speed:.0f} rad/s; "
-                "the gains are unstable, or a foot has lost the ground",
+                "the gains are unstable, a push was too strong, or a foot has lost the ground",
             )
         height = com_height - self._ground
         if height < self._limits.fall * self._height:
