@@ -155,9 +155,36 @@ def test_a_controller_may_fill_the_same_array_again():
     assert np.array(pretended.torques)[50, 0] == pytest.approx(0.04)
 
 
-def test_a_controller_cannot_change_what_it_sees():
+def test_a_simulator_that_gives_no_numbers_ends_the_run():
+    class Lost(Statue):
+        def step(self, torques, external=None):
+            now = super().step(torques, external)
+            return replace(now, q=now.q * np.nan) if self.number > 10 else now
+
+    recording = rollout(Lost(icub()), zero, Scenario(0.1))
+    assert recording.attrs["end_kind"] == "engine"
+    assert "not finite" in recording.attrs["end_reason"]
+    assert np.all(np.isfinite(recording["configuration"]))
+
+
+def test_a_simulator_may_keep_its_state_in_what_it_shows():
+    class Kept(Statue):
+        def reset(self):
+            self.kept = super().reset()
+            return self.kept
+
+        def step(self, torques, external=None):
+            super().step(torques, external)
+            self.kept.q[0] += 0.0  # its own
+            return replace(self.kept, time=self.number * self.time_step)
+
+    assert rollout(Kept(icub()), zero, Scenario(0.05)).attrs["end_kind"] == "completed"
+
+
+@pytest.mark.parametrize("part", ["q", "v", "wrenches", "com", "posture"])
+def test_a_controller_cannot_change_what_it_sees(part):
     def meddling(observation):
-        observation.q[:] = 0.0
+        getattr(observation if hasattr(observation, part) else observation.target, part)[:] = 0.0
         return np.zeros(N)
 
     with pytest.raises(ControllerError, match="read-only"):
@@ -168,6 +195,9 @@ def test_a_controller_and_a_reference_of_another_robot():
     talos = copsense.load_stance("talos")
     with pytest.raises(InvalidInputError, match=r"made for 'talos' with 28 joints.*'icub' with 23"):
         rollout(Statue(icub()), BalancingController(talos, C2), Scenario(0.1))
+    wider = icub(width=0.2)
+    with pytest.raises(InvalidInputError, match="contacts elsewhere"):
+        rollout(Statue(icub()), BalancingController(wider, C2), Scenario(0.1))
     reference = lateral_reference(talos, Sine(0.01, 1.0))
     with pytest.raises(InvalidInputError, match="the reference is made for 'talos'"):
         rollout(Statue(icub()), zero, Scenario(0.1, reference))

@@ -242,9 +242,10 @@ def _summary(recording: Any) -> dict[str, Any]:
 
 def _print(summary: dict[str, Any], written: list[str]) -> None:
     end, tip, static = summary["end"], summary["first_tip"], summary["static_prediction"]
+    through = tip and end["kind"] == "completed"
     click.echo(
         f"{summary['robot']} under {summary['controller']}: {end['reason'].rstrip('.')}, "
-        f"{end['time']:.2f} s"
+        f"{end['time']:.2f} s{', though a contact gave way' if through else ''}"
     )
     click.echo(
         f"  CoM y error {summary['com_error_rms'] * 1e3:.3f} mm rms, "

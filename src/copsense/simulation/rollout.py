@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from copsense.arrays import finite_number
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
-from copsense.controllers.target import PathReference, lateral_reference
+from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.simulation.actuation import Actuation
 from copsense.simulation.odometry import FootOdometry
@@ -29,6 +29,7 @@ from copsense.simulation.simulator import (
 from copsense.simulation.watch import Event, Thresholds, Watch
 from copsense.stance import Stance
 
+_PLACE = 1e-5  # m, rad: contacts nearer than this are at one place
 _STANDS = 0.9  # share of the weight that the ground must carry,
 _SETTLED = 0.02  # and for how long [s], five time constants of a contact, for odometry to begin
 _REPORT = 50  # control periods between two reports of progress
@@ -104,10 +105,10 @@ def _run(
     reference = scenario.reference
     if not isinstance(reference, PathReference):
         reference = lateral_reference(believed, reference)
-    _check_same_robot(believed, reference.path.stances[0], "the reference")
+    _check_same(believed, reference.path.stances[0], "the reference")
     made_for = getattr(controller, "stance", None)
     if isinstance(made_for, Stance):
-        _check_same_robot(believed, made_for, f"controller {name!r}")
+        _check_same(believed, made_for, f"controller {name!r}")
     if scenario.model_error:
         simulator = _alterable(simulator, "a model error").altered(
             scenario.model_error.applied(believed)
@@ -141,15 +142,16 @@ def _run(
             change = changes.popleft()
             ground.set_friction(change.friction, change.contact)
         q, v = sensors.read(now)
-        for seen in (q, v, now.wrenches):  # the controller's to read, not to change
-            seen.setflags(write=False)
         try:
-            observation = Observation(time, q, v, target, now.wrenches)
+            observation = _shown(time, q, v, target, now.wrenches)
             command = ask(controller, observation, n)
             here = now
             for _ in range(steps):
                 torques = actuation.apply(command.torques)
                 now = simulator.step(torques, pushes.at(now))
+            if not (np.all(np.isfinite(now.q)) and np.all(np.isfinite(now.v))):
+                now = here
+                raise SimulatorStoppedError("the motion is not finite any more", time)
             now = sensors.measured(now)
         except ControllerError as error:
             if not len(recorder):
@@ -203,12 +205,29 @@ def _alterable(simulator: Simulator, what: str) -> AlterableSimulator:
     return simulator
 
 
-def _check_same_robot(here: Stance, there: Stance, what: str) -> None:
+def _shown(
+    time: float, q: np.ndarray, v: np.ndarray, target: Target, wrenches: np.ndarray
+) -> Observation:
+    """What the controller sees: its to read, not to change."""
+    q, v, wrenches = (seen.view() for seen in (q, v, wrenches))
+    for seen in (q, v, wrenches, *vars(target).values()):
+        seen.setflags(write=False)
+    return Observation(time, q, v, target, wrenches)
+
+
+def _check_same(here: Stance, there: Stance, what: str) -> None:
+    """Refuse what is made for another robot, or for the same on other ground."""
     ours, theirs = here.robot.joint_names, there.robot.joint_names
     if ours != theirs:
         raise InvalidInputError(
             f"{what} is made for {there.robot.name!r} with {len(theirs)} joints, the simulator is "
             f"of {here.robot.name!r} with {len(ours)}. Make both of one stance."
+        )
+    place, other = (np.array([p.homogeneous for p in s.placements]) for s in (here, there))
+    if here.contact_names != there.contact_names or np.abs(place - other).max() > _PLACE:
+        raise InvalidInputError(
+            f"{what} is made for other contacts, or contacts elsewhere, than the simulator. Make "
+            "both of one stance."
         )
 
 
