@@ -1,6 +1,9 @@
 """What disturbs a robot: seeded, as it says, and seen by what should see it."""
 
+import typing
+
 import numpy as np
+import pinocchio as pin
 import pytest
 from standing import C1, C2, Statue, icub, simulator
 
@@ -152,6 +155,35 @@ def test_stiff_gains_stand_odometry_that_begins_when_the_robot_stands(foot):
         sway = Sine(side * 0.01, 0.5)
         recording = run(Scenario(0.4, sway, push, noise=Noise(0.0, 1e-3), odometry=foot))
         assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]
+
+
+def test_a_push_acts_where_it_says():
+    class Pushed(Statue):
+        felt: typing.ClassVar = []
+
+        def step(self, torques, external=None):
+            if external is not None:
+                self.felt.append(external)
+            return super().step(torques, external)
+
+    stance = icub()
+    model, data = stance.robot.model, stance.robot.model.createData()
+    push = Push((3.0, 8.0, -2.0), 0.0, 0.01, "l_hand")
+    rollout(Pushed(stance), lambda o: np.zeros(model.nv - 6), Scenario(0.02, pushes=(push,)))
+    J = pin.computeFrameJacobian(
+        model, data, stance.q, model.getFrameId("l_hand"), pin.LOCAL_WORLD_ALIGNED
+    )
+    assert Pushed.felt[0] == pytest.approx(J[:3].T @ push.force)
+
+
+def test_a_payload_is_where_it_says():
+    stance = icub()
+    heavy = ModelError(payload={"l_hand": 1.5}).applied(stance)
+    model, data = stance.robot.model, stance.robot.model.createData()
+    pin.framesForwardKinematics(model, data, stance.q)
+    hand = data.oMf[model.getFrameId("l_hand")].translation
+    mass = stance.robot.mass
+    assert heavy.com == pytest.approx((mass * stance.com + 1.5 * hand) / (mass + 1.5), abs=1e-9)
 
 
 @pytest.mark.parametrize("duration", [1e-4, 1e-3, 1.5e-3, 0.0123, 0.05])

@@ -28,6 +28,7 @@ from copsense.plots.style import (
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 _RED = "#b3261e"
+_STILL = 0.1  # mm: less than this is drawn as standing still
 _MOST_NAMED = 6  # joints whose torque has a line of its own in the legend
 
 
@@ -103,8 +104,8 @@ def _draw_forces(ax: Axes, dataset: xr.Dataset, colour: dict[str, str]) -> None:
     share = dataset["wrench"].sel(component="fz") / float(dataset.attrs["weight"]) * 100
     for name, c in colour.items():
         ax.plot(dataset["time"], share.sel(contact=name), color=c)
-    most = float(np.nanmax(share.values[_standing(dataset)]))
-    ax.set_ylim(-5.0, 1.15 * max(most, 10.0))  # the blows of a fall would press the rest flat
+    most = float(np.nanmax(share.values[_telling(dataset)]))
+    ax.set_ylim(-5.0, 1.15 * max(most, 10.0))
     ax.set_ylabel("normal force [% of the weight]")
     put_legend(ax, _handles(colour))
 
@@ -157,6 +158,9 @@ def _draw_com(ax: Axes, dataset: xr.Dataset) -> None:
     ax.plot(time, target, **_STATIC)
     ax.plot(time, com, color="#1d2733")
     ax.set_ylabel("CoM y [mm]")
+    span = np.concatenate([target.values, com.values])
+    if np.ptp(span) < _STILL:  # rounding is no motion
+        ax.set_ylim(span.mean() - _STILL, span.mean() + _STILL)
     wide = Line2D([], [], label="asked for", **{**_STATIC, "linewidth": 4.0})
     put_legend(ax, [wide, Line2D([], [], color="#1d2733", label="measured")])
 
@@ -165,14 +169,14 @@ def _draw_torques(ax: Axes, dataset: xr.Dataset) -> None:
     torque = dataset["torque"].transpose("time", "joint").values
     names = labels(dataset, "joint")
     ax.plot(dataset["time"], torque, color=MUTED, linewidth=0.7, alpha=0.5)
-    standing = torque[_standing(dataset)]
+    standing = torque[_telling(dataset)]
     largest = np.argsort(-np.abs(standing).max(axis=0))[:_MOST_NAMED]
     handles = []
     for c, j in zip(_CONTACTS, largest, strict=False):
         handles += ax.plot(dataset["time"], torque[:, j], color=c, linewidth=1.4, label=names[j])
     reach = 1.15 * float(np.abs(standing).max()) + 0.1
     ax.set_ylim(-reach, reach)
-    ax.set_ylabel(f"torque{_before(dataset)} [Nm]")
+    ax.set_ylabel("torque [Nm]")
     put_legend(ax, handles)
 
 
@@ -182,6 +186,15 @@ def _standing(dataset: xr.Dataset) -> np.ndarray:
     rows = time <= tip if np.isfinite(tip) else np.ones(len(time), dtype=bool)
     rows[0] = len(rows) == 1
     return rows if np.any(rows) else np.ones(len(time), dtype=bool)
+
+
+def _telling(dataset: xr.Dataset) -> np.ndarray:
+    """Rows (N,) that a scale is for: the blows of a fall would press the rest flat."""
+    rows = _standing(dataset)
+    if dataset.attrs.get("end_kind") == "completed":
+        rows = np.ones(len(rows), dtype=bool)
+        rows[0] = len(rows) == 1
+    return rows
 
 
 def _hip_roll(dataset: xr.Dataset) -> str | None:
