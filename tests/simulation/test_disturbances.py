@@ -176,6 +176,15 @@ def test_a_push_acts_where_it_says():
     assert Pushed.felt[0] == pytest.approx(J[:3].T @ push.force)
 
 
+def test_a_heavier_robot_turns_as_slowly_as_it_moves():
+    stance = icub()
+    heavy = ModelError(mass=0.05).applied(stance)
+    ours, theirs = (
+        pin.crba(s.robot.model, s.robot.model.createData(), stance.q) for s in (stance, heavy)
+    )
+    assert theirs == pytest.approx(1.05 * ours, abs=1e-12)
+
+
 def test_a_payload_is_where_it_says():
     stance = icub()
     heavy = ModelError(payload={"l_hand": 1.5}).applied(stance)
