@@ -25,6 +25,7 @@ from copsense.benchmark.trials import (
     ScoreKind,
     Sway,
     Trial,
+    shown_unit,
 )
 
 __all__ = [
@@ -54,5 +55,6 @@ __all__ = [
     "read_plan",
     "run_benchmark",
     "run_case",
+    "shown_unit",
     "wilson_interval",
 ]

@@ -15,8 +15,6 @@ _WORDS = {
     float: "a number",
     int: "a whole number",
     str: "a text",
-    tuple: "a list",
-    Mapping: "a table",
 }
 
 

@@ -24,8 +24,6 @@ _AFTER = 1.0  # s to watch after a push
 _SETTLED = 0.1, 0.2  # s, or share of a run: the ground takes up the weight
 _FASTEST = 0.5  # m/s of the CoM: a push that gives it more tips everything
 
-_POINTS = "no contact has a sole's edge"
-
 Status = Literal["measured", "bound", "tipped", "none", "failed"]
 
 
@@ -130,7 +128,8 @@ def _sway(trial: Sway, bench: Bench) -> list[Score]:
         if math.isfinite(smallest):
             margin = _measured(margin, smallest)
         else:
-            margin = replace(margin, status="none", reason=_and(_POINTS, note))
+            reason = _and("no contact has a sole's edge", note)
+            margin = replace(margin, status="none", reason=reason)
         error = (late["com"] - late["com_target"]).sel(com_axis="y").values
         torque = late["torque"].values
         y = trial.amplitude * np.sin(2 * np.pi * trial.frequency * late["time"].values)

@@ -51,6 +51,11 @@ SCORES = {
 """What each score is."""
 
 
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit in which a score is shown, and the factor to it: lengths in millimetres."""
+    return ("mm", 1e3) if unit == "m" else (unit, 1.0)
+
+
 def _check_side(side: str) -> None:
     if side not in ("left", "right"):
         raise UnknownNameError("side", side, ("left", "right"))

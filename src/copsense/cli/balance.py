@@ -131,10 +131,10 @@ def balance(
             "them out, or name the --criterion that your controller is to be predicted by."
         )
     (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
-    signal, natural = read_signal(reference)
+    course, natural = read_signal(reference)
     scenario = Scenario(
         natural if duration is None else duration,
-        signal,
+        course,
         control_period=control_period,
         name=reference,
         **read_disturbances(options),
@@ -144,7 +144,7 @@ def balance(
     simulator = MujocoSimulator(stance, wrenches=wrenches)
     scenario.steps_per_control(simulator.time_step)
     law = read_controller(stance, controller, criterion, gains, gain, allowed)
-    path = lateral_reference(stance, signal)
+    path = lateral_reference(stance, course)
     total = round(scenario.duration / scenario.control_period)
     with (
         tqdm(total=total, desc="balancing", unit="step", disable=None, leave=False) as bar,

@@ -311,14 +311,14 @@ def _summary(plan: Sequence[Case], table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
-    from copsense.benchmark import CAVEAT, agreement, rank_controllers
+    from copsense.benchmark import CAVEAT, agreement, rank_controllers, shown_unit
 
     for (robot, posture, conditions, trial), rows in table.groupby(
         ["robot", "posture", "conditions", "trial"], sort=False
     ):
         click.echo(f"{robot}, {posture}, {conditions}: {trial}")
         for score, group in rows.groupby("score", sort=False):
-            unit, factor = _shown(group["unit"].iloc[0])
+            unit, factor = shown_unit(group["unit"].iloc[0])
             click.echo(f"  {str(score).replace('_', ' ')} [{unit}]")
             for row in group.itertuples():
                 click.echo(f"    {row.controller}: {_value(row, factor)}")
@@ -332,7 +332,7 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
         return
     click.echo("\nprediction against simulation")
     for row in found.itertuples():
-        unit, factor = _shown(row.unit)
+        unit, factor = shown_unit(row.unit)
         r = "r needs 4 cases"
         if math.isfinite(row.correlation) and math.isfinite(row.low):
             r = f"r = {row.correlation:.4f} (95 % interval {row.low:.4f} to {row.high:.4f})"
@@ -351,11 +351,6 @@ def _ranked(row: Any, alike: bool) -> str:
 
 
 _VERBS = {"slipped": "slips", "left the ground": "lifts"}
-
-
-def _shown(unit: str) -> tuple[str, float]:
-    """Lengths are shown in millimetres."""
-    return ("mm", 1e3) if unit == "m" else (unit, 1.0)
 
 
 _UNMEASURED = {"failed": "failed", "tipped": "not measured", "none": "nothing to measure"}

@@ -114,18 +114,17 @@ class Percentiles:
 
         NaN where a column has no number.
         """
-        rows = []
-        for upper, lower in zip(self._upper, self._lower or [], strict=False):
+        found = np.full((len(self._upper), len(self._levels)), np.nan)
+        if self._lower is None:  # no block at all
+            return found
+        for row, upper, lower in zip(found, self._upper, self._lower, strict=True):
             keys = [
                 (int(h) << 16) + int(np.searchsorted(np.cumsum(lower[int(h)]), rank))
                 for h, rank in zip(*self._high(upper), strict=True)
             ]
-            rows.append(_values(np.array(keys, dtype=np.uint32)) if keys else self._nothing)
-        return np.array(rows or [self._nothing] * len(self._upper))
-
-    @property
-    def _nothing(self) -> np.ndarray:
-        return np.full(len(self._levels), np.nan)
+            if keys:
+                row[:] = _values(np.array(keys, dtype=np.uint32))
+        return found
 
     def _high(self, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Upper half of the key of each percentile, and its rank among those that share it."""

@@ -87,9 +87,7 @@ class Sway:
 
 def stretch(recording: xr.Dataset) -> Stretch:
     """What a recording shows while every contact stood."""
-    tip = float(recording.attrs["tip_time"])
-    end = tip if np.isfinite(tip) else None
-    standing = recording.sel(time=slice(None, end))
+    standing = _standing(recording)
     # A recording that ends sooner has no settled part: then all but its first instant counts.
     settled = standing.sel(time=slice(_SETTLED, None))
     standing = settled if settled.sizes["time"] > 1 else standing.isel(time=slice(1, None))
@@ -108,10 +106,15 @@ def stretch(recording: xr.Dataset) -> Stretch:
     )
 
 
+def _standing(recording: xr.Dataset) -> xr.Dataset:
+    """The part until a foot tips."""
+    tip = float(recording.attrs["tip_time"])
+    return recording.sel(time=slice(None, tip if np.isfinite(tip) else None))
+
+
 def tracking_error(recording: xr.Dataset) -> float:
     """Root mean square of CoM y minus its target until a foot tips, from the very start [m]."""
-    tip = float(recording.attrs["tip_time"])
-    stood = recording.sel(time=slice(None, tip if np.isfinite(tip) else None))
+    stood = _standing(recording)
     error = (stood["com"] - stood["com_target"]).sel(com_axis="y")
     return float(np.sqrt((error**2).mean()))
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from copsense.benchmark import CAVEAT, agreement
+from copsense.benchmark import CAVEAT, agreement, shown_unit
 from copsense.plots.style import INK, MUTED, colours, new_figure, styled
 
 _ACROSS = 3  # panels in a row
@@ -91,7 +91,7 @@ def _draw_agreement(
 ) -> None:
     """Simulated over predicted; on the diagonal they are equal."""
     rows = table[(table["score"] == score) & (table["status"] == "measured")]
-    unit, factor = _shown(rows["unit"].iloc[0])
+    unit, factor = shown_unit(rows["unit"].iloc[0])
     for column, face in (("first_order", "none"), ("predicted", None)):
         for name, own in rows.groupby("controller", sort=False):
             x, y = own[column].to_numpy(float) * factor, own["value"].to_numpy(float) * factor
@@ -130,7 +130,7 @@ def _draw_bars(
     ax: Axes, trial: str, score: str, rows: pd.DataFrame, colour: dict[str, str], room: int
 ) -> None:
     """A bar per controller in each setting, its interval as a whisker, the prediction as a tick."""
-    unit, factor = _shown(rows["unit"].iloc[0])
+    unit, factor = shown_unit(rows["unit"].iloc[0])
     settings = [key for key, _ in rows.groupby(_SETTING, sort=False)]
     names = [name for name in colour if name in set(rows["controller"])]
     several = rows["conditions"].nunique() > 1
@@ -181,7 +181,3 @@ def _note(ax: Axes, x: float, y: float, text: str) -> None:
 
 def _words(score: str) -> str:
     return score.replace("_", " ")
-
-
-def _shown(unit: str) -> tuple[str, float]:
-    return ("mm", 1e3) if unit == "m" else (unit, 1.0)

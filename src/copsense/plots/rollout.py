@@ -190,11 +190,8 @@ def _standing(dataset: xr.Dataset) -> np.ndarray:
 
 def _telling(dataset: xr.Dataset) -> np.ndarray:
     """Rows (N,) that a scale is for: the blows of a fall would press the rest flat."""
-    rows = _standing(dataset)
-    if dataset.attrs.get("end_kind") == "completed":
-        rows = np.ones(len(rows), dtype=bool)
-        rows[0] = len(rows) == 1
-    return rows
+    through = dataset.attrs.get("end_kind") == "completed"
+    return _standing(dataset.assign_attrs(tip_time=np.nan) if through else dataset)
 
 
 def _hip_roll(dataset: xr.Dataset) -> str | None:

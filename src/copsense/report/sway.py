@@ -6,7 +6,7 @@ import math
 
 import pandas as pd
 
-from copsense.benchmark import CAVEAT, agreement, rank_scores
+from copsense.benchmark import CAVEAT, agreement, rank_scores, shown_unit
 from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel, tracking_error
 from copsense.plots import plot_sway_cop, plot_sway_hip_roll, plot_sway_limits, plot_sway_load
 from copsense.plots.style import Figure
@@ -179,9 +179,8 @@ def sway_differences(sway: Sway) -> tuple[str, ...]:
 
 
 def _quantity(value: float, unit: str) -> str:
-    if not math.isfinite(value):
-        return "–"
-    return f"{value * 1e3:.3g} mm" if unit == "m" else f"{value:.3g} {unit}"
+    shown, factor = shown_unit(unit)
+    return f"{value * factor:.3g} {shown}" if math.isfinite(value) else "–"
 
 
 def _mm(value: float, *, sign: bool = False) -> str:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from ctypes.util import find_library
 from typing import Any
 
@@ -87,9 +85,8 @@ class MujocoSimulator:
         under = self._model.pair_geom2[: self._model.npair]
         self._contact_of_pair = self._contact_of[under]
         self._friction = self._model.pair_friction.copy()
-        with _hushed(self._mujoco):
-            self._compare()
-            self.reset()
+        self._compare()
+        self.reset()
 
     @property
     def stance(self) -> Stance:
@@ -127,8 +124,10 @@ class MujocoSimulator:
             data.qfrc_applied[:3] = base @ external[:3]
             data.qfrc_applied[3:6] = external[3:6]
             data.qfrc_applied[self._columns[6:]] += external[6:]
-        with _hushed(self._mujoco):
-            self._mujoco.mj_step(self._model, data)
+        shown = self._mujoco.get_mju_user_warning()
+        self._mujoco.set_mju_user_warning(_quiet)  # it would write a log file where we stand
+        self._mujoco.mj_step(self._model, data)
+        self._mujoco.set_mju_user_warning(shown)
         warned = [w for w in _FATAL if data.warning[getattr(self._mujoco.mjtWarning, w)].number]
         if warned or not data.time > before:
             raise SimulatorStoppedError(
@@ -267,15 +266,8 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
-@contextmanager
-def _hushed(mujoco: Any) -> Iterator[None]:
-    """Warnings are read from the engine's counters; it would write a log file where we stand."""
-    shown = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(shown)
+def _quiet(message: str) -> None:
+    """Warnings are read from the engine's counters."""
 
 
 def load_mujoco() -> Any:
