@@ -89,6 +89,7 @@ def test_the_report_shows_the_closed_loop(sway, tmp_path):
     assert {"loop_6a", "loop_6b", "loop_7a", "loop_7b", "loop_8", "loop_9b"} <= names
     page = write_report(reproduction, tmp_path / "report").read_text(encoding="utf-8")
     assert 'id="closed-loop"' in page
+    assert 'href="#closed-loop"' in page
     assert "r_sole tips at" in page
     for told in ("31.1 mm", "41.1 mm", "32.1 mm", "32.2 mm", "Slow leans", "No hardware data"):
         assert told in page, told
@@ -97,7 +98,7 @@ def test_the_report_shows_the_closed_loop(sway, tmp_path):
     stood = stretch(sway.torque)
     assert rows["minimum torque"]["margin"] == f"{stood.margin.min() * 1e3:.2f} mm"
     error = (sway.torque["com"] - sway.torque["com_target"]).sel(com_axis="y").values
-    assert rows["minimum torque"]["error"] == f"{np.sqrt(np.mean(error**2)) * 1e3:.3f} mm"
+    assert rows["minimum torque"]["error"] == f"{np.sqrt(np.mean(error**2)) * 1e3:.4f} mm"
     assert "--limits" in page.partition("minimum-torque_within.nc")[0].rpartition("copsense")[2]
     assert "copsense balance icub --criterion minimum-wrench --reference sine:0.041:0.1" in page
     recorded = sorted(p.name for p in (tmp_path / "report" / "data").glob("closed_loop_*.nc"))

@@ -120,7 +120,7 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
                 else str(run.attrs["end_reason"]),
                 "tip": _mm(tip_travel(run) * 1e3, sign=True),
                 "static": "held by the limits" if limited else _mm(static * 1e3, sign=True),
-                "error": f"{tracking_error(run) * 1e3:.3f} mm",
+                "error": f"{tracking_error(run) * 1e3:.4f} mm",
                 "margin": f"{float(stood.margin.min()) * 1e3:.2f} mm",
             }
         )
