@@ -25,14 +25,14 @@ import pinocchio as pin
 from tqdm import tqdm
 
 import copsense
-from copsense.benchmark import (
+from copsense.comparison import (
     CAVEAT,
     agreement,
     rank_controllers,
     read_plan,
     run_benchmark,
 )
-from copsense.benchmark.bench import Bench
+from copsense.comparison.bench import Bench
 from copsense.controllers import BalancingController, Hold, Observation, Sine
 from copsense.plots import plot_benchmark, save_figure
 from copsense.simulation import MujocoSimulator
@@ -276,7 +276,7 @@ def page(table: pd.DataFrame) -> list[str]:
 
 
 def _larger(row: pd.Series) -> bool:
-    from copsense.benchmark import SCORES
+    from copsense.comparison import SCORES
 
     return SCORES[row["score"]].larger
 

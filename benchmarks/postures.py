@@ -83,7 +83,7 @@ def rows():
                     *notes,
                 )
                 clear = PostureChart(chart.stance, chart.names)
-                clear.why_clear = "measured"
+                clear.fallback_reason = "measured"
                 found["icub, com, clear path"] = (
                     lambda clear=clear, values=values: clear.solve(values[:8]),
                     8,

@@ -76,8 +76,8 @@ def sizes(rounds: int, progress: Callable[[str], None]) -> list[str]:
     runs = {}
     for name, stance in cases.items():
         kernel = BatchKernel(stance, CRITERIA, gains=False)
-        if kernel.why_clear:
-            raise SystemExit(f"{name}: {kernel.why_clear}")
+        if kernel.fallback_reason:
+            raise SystemExit(f"{name}: {kernel.fallback_reason}")
         runs[name] = batches(kernel, draw(stance, CHUNK, seed=1))
     times = interleaved(runs, rounds, progress)
     first = statistics.median(next(iter(times.values())))

@@ -56,7 +56,7 @@ ELSEWHERE = (
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
-    (r"py:.*", r"ArrayLike|Float|WrenchLaw|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
+    (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
     (r"py:class", r"copsense\.paper\.claim\.Subject"),  # a type variable
 ]
 

@@ -5,10 +5,11 @@ import os
 # Small matrices on few cores; set before NumPy loads its BLAS.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import support.shape_checks  # noqa: F401 -- the hook below finds it by name
 from jaxtyping import install_import_hook
 
 # Every shape that copsense annotates is checked while the suite runs, and only then.
-install_import_hook("copsense", "shape_checks.check")
+install_import_hook("copsense", "support.shape_checks.check")
 
 import pytest  # noqa: E402
 

@@ -15,7 +15,7 @@ def test_a_wrong_shape_is_caught(icub):
         icub.stack(np.zeros((2, 5)))
     # A name stands for one number wherever it appears: n torques, nv = n + 6 velocities.
     with pytest.raises(TypeCheckError):
-        copsense.Path((icub,), "index", "1", np.zeros(2), np.zeros((1, 29)))
+        copsense.PosturePath((icub,), "index", "1", np.zeros(2), np.zeros((1, 29)))
 
 
 def test_what_users_import_checks_nothing():

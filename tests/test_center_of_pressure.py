@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from grounds import off_centre, on_tilted_planes, with_hand
-from loads import CRITERIA, criteria
+from support.grounds import off_centre, on_tilted_planes, with_hand
+from support.loads import CRITERIA, criteria
 
 import copsense
 from copsense import Plane

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from grounds import off_centre
-from loads import CRITERIA, criteria
+from support.grounds import off_centre
+from support.loads import CRITERIA, criteria
 
 import copsense
 

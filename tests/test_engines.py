@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from differences import relative
-from engines import IdyntreeRobot, MujocoRobot
+from support.differences import relative
+from support.engines import IdyntreeRobot, MujocoRobot
 
 import copsense
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from differences import along, largest_error
-from grounds import off_centre
-from loads import CRITERIA, criteria
+from support.differences import along, largest_error
+from support.grounds import off_centre
+from support.loads import CRITERIA, criteria
 
 import copsense
 
@@ -34,18 +34,18 @@ def test_cops_and_loads_together_follow_the_com(posture, name):
 
 def test_minimum_wrench_depends_on_the_com_alone(posture):
     found = copsense.cop_sensitivity(posture, copsense.minimum_wrench(1.0))
-    singular = np.linalg.svd(found.raw.reshape(4, -1))[1]
+    singular = np.linalg.svd(found.matrix.reshape(4, -1))[1]
     assert singular[1] > 1e-2
     assert singular[2] < 1e-12
     # What the CoM does not feel, the CoPs do not.
     horizontal = posture.com_jacobian[:2] @ found.basis
     gains = found.com_gain.reshape(4, 2)
-    np.testing.assert_allclose(found.raw.reshape(4, -1), gains @ horizontal, rtol=0, atol=EXACT)
+    np.testing.assert_allclose(found.matrix.reshape(4, -1), gains @ horizontal, rtol=0, atol=EXACT)
 
 
 def test_minimum_torque_depends_on_more_than_the_com(posture):
     found = copsense.cop_sensitivity(posture, copsense.minimum_torque())
-    assert np.linalg.matrix_rank(found.raw.reshape(4, -1), tol=1e-3) == 4
+    assert np.linalg.matrix_rank(found.matrix.reshape(4, -1), tol=1e-3) == 4
 
 
 def test_minimum_torques_are_the_projection_of_gravity_on_the_motions(lateral_path):
@@ -117,12 +117,12 @@ def test_worst_case_gain_bounds_every_motion_and_is_reached(posture):
     for k, bound in enumerate(found.worst_case_gain):
         # The speed of the CoP, per sqrt(2 energy / mass), over random and the steepest motions.
         energy = found.basis.T @ M @ found.basis
-        steepest = np.linalg.solve(energy, found.raw[k].T)
+        steepest = np.linalg.solve(energy, found.matrix[k].T)
         angles = np.linspace(0, np.pi, 721)
         motions = np.hstack(
             [rng.standard_normal((17, 200)), steepest @ [np.cos(angles), np.sin(angles)]]
         )
-        speed = np.linalg.norm(found.raw[k] @ motions, axis=0)
+        speed = np.linalg.norm(found.matrix[k] @ motions, axis=0)
         gains = speed * np.sqrt(m / np.einsum("ip,ij,jp->p", motions, energy, motions))
         assert gains.max() <= bound * (1 + 1e-12)
         assert gains.max() == pytest.approx(bound, rel=1e-4)

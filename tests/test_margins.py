@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grounds import off_centre
+from support.grounds import off_centre
 
 import copsense
 

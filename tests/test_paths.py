@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from differences import largest_error
+from support.differences import largest_error
 
 import copsense
 from copsense.posture import contact_error

@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from differences import largest_error
-from grounds import off_centre, on_tilted_planes, with_hand
+from support.differences import largest_error
+from support.grounds import off_centre, on_tilted_planes, with_hand
 
 import copsense
 from copsense.posture import contact_error, supporting_joints

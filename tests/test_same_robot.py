@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from grounds import off_centre
-from models import base_pose, put_together, rerooted, shifted_base, stance_with, take_apart
+from support.grounds import off_centre
+from support.models import base_pose, put_together, rerooted, shifted_base, stance_with, take_apart
 
 import copsense
 
@@ -120,7 +120,7 @@ def test_choice_of_tangent_basis_does_not_matter(posture):
     Z = found.basis @ mix
     forces, torques = found.equilibrium.derivative(Z)
     other = copsense.CopSensitivity(
-        found.equilibrium, Z, found.cop, found.raw @ mix, posture.unstack(forces), torques
+        found.equilibrium, Z, found.cop, found.matrix @ mix, posture.unstack(forces), torques
     )
     # The derivatives along mixed motions are the mixed derivatives ...
     np.testing.assert_allclose(other.wrench_derivative, found.wrench_derivative @ mix, atol=1e-8)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from grounds import with_hand
+from support.grounds import with_hand
 
 import copsense
 

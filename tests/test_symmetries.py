@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from grounds import off_centre
-from models import FLIP, base_pose, mirrored, scaled, stance_with, take_apart
+from support.grounds import off_centre
+from support.models import FLIP, base_pose, mirrored, scaled, stance_with, take_apart
 
 import copsense
 

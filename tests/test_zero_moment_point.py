@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from grounds import off_centre
+from support.grounds import off_centre
 
 import copsense
 from copsense import Plane

@@ -33,17 +33,11 @@ from copsense.criterion import (
     weighted_torque,
 )
 from copsense.design import Design, design_criterion, families
-from copsense.equilibrium import (
-    ConstrainedEquilibrium,
-    StaticEquilibrium,
-    solve_equilibrium,
-    wrench_law,
-)
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
 from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
 from copsense.margins import limit_margins, limit_travel
-from copsense.motion import Path, joint_sweep, lateral_sweep, path_through
+from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
 from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
@@ -65,8 +59,14 @@ from copsense.sensitivity import (
 )
 from copsense.sole import Sole, read_sole
 from copsense.stance import Stance
+from copsense.statics import (
+    ConstrainedEquilibrium,
+    StaticEquilibrium,
+    solve_equilibrium,
+    wrench_policy,
+)
 from copsense.storage import load_results, write_results
-from copsense.sweep import failed_rows, sweep
+from copsense.sweeps import failed_rows, sweep
 
 __all__ = [
     "CRITERIA",
@@ -83,10 +83,10 @@ __all__ = [
     "Grid",
     "LimitChange",
     "Limits",
-    "Path",
     "Plane",
     "Posture",
     "PostureCost",
+    "PosturePath",
     "Robot",
     "Sample",
     "Sole",
@@ -139,7 +139,7 @@ __all__ = [
     "total_center_of_pressure",
     "weighted_torque",
     "with_limit_margins",
-    "wrench_law",
+    "wrench_policy",
     "write_results",
     "zero_moment_point",
 ]

@@ -11,13 +11,13 @@ import scipy.optimize
 from jaxtyping import Float
 
 from copsense.criterion import Criterion
-from copsense.equilibrium import ConstrainedEquilibrium, distance_to_change
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits
 from copsense.margins import check_search
-from copsense.motion import lateral_posture
+from copsense.path import lateral_posture
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
+from copsense.statics import ConstrainedEquilibrium, distance_to_change
 
 _HERE = 1e-7  # m of CoM: what changes nearer than this changes here
 _ROUNDING = 1e-9  # shares of the weight, or of the cost's gradient, by which nothing has changed

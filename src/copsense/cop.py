@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
 from copsense.contact import Plane, edge_side, half_planes
-from copsense.equilibrium import StaticEquilibrium
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.stance import Stance
+from copsense.statics import StaticEquilibrium
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from copsense.criterion import (
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.margins import margin_table
-from copsense.motion import Path
+from copsense.path import PosturePath
 from copsense.posture import supporting_joints
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
@@ -99,7 +99,7 @@ class Design:
 
 
 def design_criterion(
-    path: Path,
+    path: PosturePath,
     limits: Limits,
     family: Family,
     *,
@@ -190,7 +190,7 @@ def design_criterion(
 
 
 def score(
-    path: Path,
+    path: PosturePath,
     limits: Limits,
     criterion: Criterion,
     parameters: Mapping[str, float],

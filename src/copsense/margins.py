@@ -13,11 +13,11 @@ from jaxtyping import Float
 from copsense.arrays import finite_number
 from copsense.contact import Contact
 from copsense.criterion import Criterion
-from copsense.equilibrium import StaticEquilibrium, solve_equilibrium
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import LimitRows, Limits, limit_rows
-from copsense.motion import lateral_posture
+from copsense.path import lateral_posture
 from copsense.stance import Stance
+from copsense.statics import StaticEquilibrium, solve_equilibrium
 
 # Of a margin, by the limit's kind; "N" for the others.
 UNITS = {"cop": "m", "torsion": "N m", "torque": "N m"}

@@ -6,26 +6,26 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
 from copsense.contact import half_planes
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
-from copsense.equilibrium import (
-    PROJECT,
-    ActiveSetChange,
-    ConstrainedEquilibrium,
-    StaticEquilibrium,
-    WrenchLaw,
-    is_admissible,
-    solve_equilibrium,
-)
 from copsense.errors import InvalidInputError, SensitivityMismatchError
 from copsense.limits import Limits
 from copsense.posture import retract
 from copsense.stance import Stance
+from copsense.statics import (
+    PROJECT,
+    ActiveSetChange,
+    ConstrainedEquilibrium,
+    StaticEquilibrium,
+    WrenchPolicy,
+    is_admissible,
+    solve_equilibrium,
+)
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
@@ -40,9 +40,9 @@ class CopSensitivity:
 
     Attributes:
         equilibrium: the equilibrium differentiated.
-        basis: admissible motions Z (nv, p) that the raw matrices refer to, orthonormal columns.
+        basis: admissible motions Z (nv, p) that the matrices refer to, orthonormal columns.
         cop: centres of pressure (nc, 2), contact axes [m].
-        raw: eta = d cop / d xi along the columns of the basis (nc, 2, p).
+        matrix: eta = d cop / d xi along the columns of the basis (nc, 2, p).
         wrench_derivative: d wrenches (nc, 6, p), contact axes.
         torque_derivative: d torques (n, p).
     """
@@ -50,7 +50,7 @@ class CopSensitivity:
     equilibrium: StaticEquilibrium
     basis: Float[np.ndarray, "nv p"]
     cop: Float[np.ndarray, "nc 2"]
-    raw: Float[np.ndarray, "nc 2 p"]
+    matrix: Float[np.ndarray, "nc 2 p"]
     wrench_derivative: Float[np.ndarray, "nc 6 p"]
     torque_derivative: Float[np.ndarray, "n p"]
 
@@ -60,7 +60,7 @@ class CopSensitivity:
 
         Free of the choice of basis: its product with an admissible motion is that motion's rate.
         """
-        return self.raw @ self.basis.T
+        return self.matrix @ self.basis.T
 
     def along(self, tangent: ArrayLike, rate: float = 1.0) -> Float[np.ndarray, "nc 2"]:
         """d cop / d coordinate along a path.
@@ -207,36 +207,58 @@ class CopSensitivity:
         # The largest singular value, 0 where the contacts leave nothing to move.
         speeds = [
             np.linalg.svd(eta @ self._inverse_root, compute_uv=False).max(initial=0.0)
-            for eta in self.raw
+            for eta in self.matrix
         ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
     @cached_property
     def com_travel(self) -> Float[np.ndarray, " nc"]:
-        """How far the CoM may move before a contact tips, to first order [m].
+        """How far the CoM may move before a contact tips, to first order of the slack [m].
 
-        Least over the sole's edges of ``margin / |a' Gamma|``, a the edge's normal: signed as the
-        margin (negative where the CoP is off the sole already), infinite where the CoP does not
-        move (a point contact, or a contact without a polygon).
+        The slack of an edge is ``s = w (b - a . p)``, with w the contact's share of the weight,
+        a the edge's outward normal and b its offset. It is affine in the CoM wherever the wrenches
+        are, so that ``|s| / |grad s|`` with ``grad s = (b - a . p) grad w - w a' Gamma`` is exact
+        for such criteria. The least of a sole's edges counts, see `tipping_edge`. Negative where
+        the CoP is off the sole already or the contact pulls; infinite where no edge comes nearer
+        (a point contact, or a contact without a sole).
         """
-        travel = np.full(len(self.cop), np.inf)
-        for k, contact in enumerate(self.equilibrium.stance.contacts):
+        return self._tipping[0]
+
+    @cached_property
+    def tipping_edge(self) -> Int[np.ndarray, " nc"]:
+        """Index of the sole's edge that `com_travel` goes to (nc,); -1 where it goes to none.
+
+        Edge i of a contact's polygon goes from its vertex i to the next.
+        """
+        return self._tipping[1]
+
+    @cached_property
+    def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
+        stance = self.equilibrium.stance
+        travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
+        shares = self.equilibrium.wrenches[:, 2] / stance.robot.weight
+        for k, contact in enumerate(stance.contacts):
             if contact.polygon is None or contact.kind == "point":
                 continue
-            normals, offsets = half_planes(contact.polygon)
-            margins = offsets - normals @ self.cop[k]
-            speeds = np.linalg.norm(normals @ self.com_gain[k], axis=1)
-            moving = speeds > _STILL
-            if np.any(moving):
-                travel[k] = np.min(margins[moving] / speeds[moving])
-            if np.any(margins[~moving] < -_ON_EDGE):
-                travel[k] = -np.inf
-        return travel
+            # s = w (b - a p),   ds/dCoM = (b - a p) dw/dCoM - w a' Gamma
+            a, b = half_planes(contact.polygon)
+            w, margin = float(shares[k]), b - a @ self.cop[k]
+            slack = w * margin
+            rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
+            speed = np.linalg.norm(rate, axis=1)
+            moving = speed > _STILL
+            distance = np.where(moving, slack / np.where(moving, speed, 1.0), np.inf)
+            # An edge that stands still and is passed already leaves no way back.
+            distance[~moving & (slack < -_ON_EDGE)] = -np.inf
+            i = int(np.argmin(distance))
+            if not np.isposinf(distance[i]):
+                travel[k], edge[k] = distance[i], i
+        return travel, edge
 
 
 def cop_sensitivity(
     stance: Stance,
-    criterion: Criterion | WrenchLaw,
+    criterion: Criterion | WrenchPolicy,
     limits: Limits | None = None,
     *,
     step: float = _STEP,
@@ -259,7 +281,7 @@ def cop_sensitivity(
         UndeterminedWrenchError: the criterion does not determine the wrenches.
     """
     if not isinstance(criterion, Criterion):
-        return finite_difference_sensitivity(stance, criterion, step=step)
+        return finite_difference_sensitivity(stance, criterion, limits, step=step)
     equilibrium = solve_equilibrium(stance, criterion, limits)
     Z = stance.admissible_motions
     forces, torques = equilibrium.derivative(Z)
@@ -268,7 +290,7 @@ def cop_sensitivity(
 
 def finite_difference_sensitivity(
     stance: Stance,
-    criterion: Criterion | WrenchLaw,
+    criterion: Criterion | WrenchPolicy,
     limits: Limits | None = None,
     *,
     step: float = _STEP,
@@ -325,7 +347,7 @@ def check_sensitivity(
     exact = cop_sensitivity(stance, criterion, limits)
     numeric = finite_difference_sensitivity(stance, criterion, limits, step=step)
     pairs = {
-        "centre of pressure": (exact.raw, numeric.raw),
+        "centre of pressure": (exact.matrix, numeric.matrix),
         "wrench": (exact.wrench_derivative, numeric.wrench_derivative),
         "torque": (exact.torque_derivative, numeric.torque_derivative),
     }
@@ -347,8 +369,8 @@ def _sensitivity(
     torque_derivative: np.ndarray,
 ) -> CopSensitivity:
     p = contact_cops(equilibrium)
-    raw = _cop_rate(equilibrium, p, wrench_derivative)
-    return CopSensitivity(equilibrium, basis, p, raw, wrench_derivative, torque_derivative)
+    matrix = _cop_rate(equilibrium, p, wrench_derivative)
+    return CopSensitivity(equilibrium, basis, p, matrix, wrench_derivative, torque_derivative)
 
 
 def _cop_rate(

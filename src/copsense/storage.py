@@ -187,7 +187,7 @@ def _tells(test: Callable[[], bool]) -> bool:
 
 
 def _check_sweep(dataset: xr.Dataset, what: str, remedy: str) -> None:
-    """Refuse a dataset that is not what `copsense.sweep.sweep` returns."""
+    """Refuse a dataset that is not what `copsense.sweeps.sweep` returns."""
     known = {"cop", "wrench", "torque", "com", "reason", "pulling", "margin", "cop_sensitivity"}
     missing = sorted(known - set(map(str, dataset.variables)))
     if "coordinate" not in dataset.attrs:

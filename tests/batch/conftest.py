@@ -1,7 +1,7 @@
 """The cases of the batch, made once."""
 
 import pytest
-from stances import CASES
+from support.stances import CASES
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from stances import postures, served
+from support.stances import postures, served
 
 import copsense
 from copsense.arrays import whole_number

@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pinocchio as pin
 import pytest
-from stances import postures
+from support.stances import postures
 
 import copsense
 from copsense.batch import PostureChart, coordinate_names, evaluate_batch
@@ -50,7 +50,7 @@ def worst_contact(stance, q):
 def test_contacts_hold_and_coordinates_are_reached(case, name, names):
     stance = case(name)
     chart = PostureChart(stance, (*names, *FREE.get(name, ())))
-    assert not chart.why_clear
+    assert not chart.fallback_reason
     values = near(chart, 60)
     batch = chart.solve(values)
     assert len(batch) == 60
@@ -87,7 +87,7 @@ def test_the_stance_is_its_own_posture(case, name):
 def test_shared_torsos_and_longer_limbs_are_solved(case, name):
     stance = case(name)
     chart = PostureChart(stance, COM)
-    assert not chart.why_clear
+    assert not chart.fallback_reason
     values = near(chart, 20, size=0.005)
     batch = chart.solve(values)
     assert batch.converged.sum() >= 10
@@ -278,7 +278,7 @@ def test_without_numba_the_clear_path_answers_the_same(case, name, monkeypatch):
         importlib.util, "find_spec", lambda name: None if name == "numba" else find(name)
     )
     clear = PostureChart(stance, names)
-    assert "copsense[fast]" in clear.why_clear
+    assert "copsense[fast]" in clear.fallback_reason
     found = clear.solve(values)
     assert np.array_equal(found.converged, expected.converged)
     assert expected.converged.any()
@@ -290,7 +290,7 @@ def test_without_numba_the_clear_path_answers_the_same(case, name, monkeypatch):
 def test_planar_robots_take_the_clear_path(stance_of):
     stance = stance_of("four_bar")
     chart = PostureChart(stance, ["com_y"])
-    assert chart.why_clear
+    assert chart.fallback_reason
     batch = chart.solve([[stance.com[1] + 0.02], [stance.com[1] + 5.0]])
     assert list(batch.converged) == [True, False]
     here = stance.at(batch.configurations[0])
@@ -302,7 +302,7 @@ def test_one_foot_takes_the_clear_path(case):
     stance = case("icub").with_contacts(case("icub").contacts[:1])
     chart = PostureChart(stance, ["com_y", "r_knee"])
     batch = chart.solve([[stance.com[1] + 0.02, -0.7]])
-    assert chart.why_clear
+    assert chart.fallback_reason
     assert worst_contact(stance, batch.configurations[0]) < MET
     assert stance.robot.joint_position(batch.configurations[0], "r_knee") == pytest.approx(-0.7)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from stances import CASES, postures, served
+from support.stances import CASES, postures, served
 
 import copsense
 from copsense.batch import BatchKernel, evaluate_batch
@@ -26,7 +26,7 @@ def largest_error(given, expected):
 def test_the_kernel_equals_the_clear_path(case, name):
     stance = case(name)
     kernel, criteria = BatchKernel(stance, served(stance)), served(stance)
-    assert not kernel.why_clear
+    assert not kernel.fallback_reason
     q = postures(stance, PER_CASE)
     found = kernel.evaluate(q)
     assert not found.reasons
@@ -61,7 +61,7 @@ def test_margins_are_the_edge_margins(case):
 def test_every_kind_of_joint_is_served():
     stance = odd_joints()
     kernel = BatchKernel(stance, served(stance))
-    assert not kernel.why_clear
+    assert not kernel.fallback_reason
     q = postures(stance, 10)
     found, clear = kernel.evaluate(q), clear_path(stance, q)
     assert not found.reasons
@@ -71,7 +71,7 @@ def test_every_kind_of_joint_is_served():
 
 def clear_path(stance, q):
     kernel = BatchKernel(stance, served(stance))
-    kernel.why_clear = "asked for"
+    kernel.fallback_reason = "asked for"
     return kernel.evaluate(q)
 
 

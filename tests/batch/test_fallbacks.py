@@ -4,8 +4,8 @@ import importlib.util
 
 import numpy as np
 import pytest
-from grounds import off_centre
-from stances import postures, served
+from support.grounds import off_centre
+from support.stances import postures, served
 
 import copsense
 from copsense.batch import BatchKernel, evaluate_batch
@@ -51,14 +51,14 @@ def test_other_criteria_are_answered_by_the_clear_path(case):
         law,
     ]
     kernel = BatchKernel(stance, criteria)
-    assert not kernel.why_clear
+    assert not kernel.fallback_reason
     found = same_as_clear(stance, postures(stance, 2), criteria)
     assert found.criteria == (*(c.name for c in criteria[:4]), "law")
 
 
 def test_planar_robots_are_answered_by_the_clear_path(stance_of):
     stance = stance_of("four_bar")
-    assert BatchKernel(stance, [copsense.minimum_wrench(1.0)]).why_clear
+    assert BatchKernel(stance, [copsense.minimum_wrench(1.0)]).fallback_reason
     same_as_clear(stance, np.array([off_centre(stance).q]), [copsense.minimum_wrench(1.0)])
 
 
@@ -89,7 +89,7 @@ def test_contacts_without_rank_are_left_to_the_clear_path(icub, name):
     tied = copsense.minimum_torque(tie_break=wrench, name="tied")
     stance = redundant(name, icub)
     assert stance.rank < len(stance.component_index)
-    assert not BatchKernel(stance, [wrench, TORQUE, tied]).why_clear
+    assert not BatchKernel(stance, [wrench, TORQUE, tied]).fallback_reason
     found = same_as_clear(stance, np.array([stance.q, stance.q]), [wrench, TORQUE, tied])
     assert set(found.reasons) == {(0, 1), (1, 1)}
 
@@ -174,7 +174,7 @@ def test_without_numba_the_clear_path_answers_all(case, monkeypatch):
         importlib.util, "find_spec", lambda name: None if name == "numba" else find(name)
     )
     kernel = BatchKernel(stance, served(stance))
-    assert "copsense[fast]" in kernel.why_clear
+    assert "copsense[fast]" in kernel.fallback_reason
     clear = kernel.evaluate(q)
     np.testing.assert_allclose(clear.gradient, fast.gradient, rtol=0, atol=1e-11)
     np.testing.assert_allclose(kernel.one(q[0]).torques[0], fast.torques[0], rtol=0, atol=1e-10)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from commands import copsense
+from support.commands import copsense
 
 
 def numbers(value):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from commands import copsense
+from support.commands import copsense
 
 from copsense.storage import load_configurations
 
@@ -177,7 +177,7 @@ def test_an_output_under_a_file_or_in_no_folder_is_refused_before_the_sweep(tmp_
     def never(*args, **kwargs):
         raise AssertionError("the sweep began")
 
-    monkeypatch.setattr("copsense.motion.lateral_sweep", never)
+    monkeypatch.setattr("copsense.path.lateral_sweep", never)
     (tmp_path / "file").write_text("mine")
     for path in (
         tmp_path / "file" / "a.nc",

@@ -2,9 +2,9 @@
 
 import string
 
-from commands import copsense
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.commands import copsense
 
 TYPED = (
     "nan inf -inf 0 -1 1e308 1e-308 l_hip l_sole l_sole:point l_hip=5 l_hip=nan l_hip=0:3:2 l_hip= "

@@ -2,7 +2,7 @@
 
 import pytest
 import xarray as xr
-from commands import copsense
+from support.commands import copsense
 
 LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 

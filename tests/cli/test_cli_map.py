@@ -6,7 +6,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from commands import copsense as run
+from support.commands import copsense as run
 
 import copsense
 from copsense.maps import load_map, mapping

@@ -4,8 +4,8 @@ import math
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
-import planar_statics as statics
 import pytest
+from support import planar_statics as statics
 
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.paper import FOUR_BAR_CRITERIA, FourBar, solve_four_bar, solve_four_bar_member

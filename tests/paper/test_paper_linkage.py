@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import numpy as np
-import planar_statics as statics
 import pytest
+from support import planar_statics as statics
 
 from copsense.errors import InvalidInputError
 from copsense.paper import FourBar, Hand

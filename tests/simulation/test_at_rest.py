@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from standing import C1, C2, icub, simulator
+from support.standing import C1, C2, icub, simulator
 
 import copsense
 from copsense.controllers import BalancingController, Sine

@@ -8,7 +8,7 @@ from unittest.mock import patch
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import C1, C2, Statue, icub, simulator
+from support.standing import C1, C2, Statue, icub, simulator
 
 import copsense
 from copsense.controllers import (

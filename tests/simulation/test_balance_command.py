@@ -4,17 +4,14 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
 import pytest
 import xarray as xr
+from support.commands import copsense
 
 from copsense.storage import load_recording
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "cli"))
-from commands import copsense
 
 
 def test_a_run_is_summarised_recorded_and_drawn(tmp_path):

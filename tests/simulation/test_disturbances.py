@@ -5,7 +5,7 @@ import typing
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import C1, C2, Statue, icub, simulator
+from support.standing import C1, C2, Statue, icub, simulator
 
 import copsense
 from copsense.controllers import BalancingController, Sine, load_controller, public_gains

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 import pytest
-from standing import C2, icub, simulator
+from support.standing import C2, icub, simulator
 
 import copsense
 from copsense.controllers import Observation, Ramp, lateral_reference

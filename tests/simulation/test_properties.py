@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from standing import C1, C2, icub, simulator
+from support.standing import C1, C2, icub, simulator
 
 from copsense.controllers import BalancingController, Ramp, public_gains
 from copsense.simulation import (

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from reproductions import small_reproduction
+from support.reproductions import small_reproduction
 
 import copsense
 from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel

@@ -55,7 +55,7 @@ class PostureChart:
         names: the coordinates.
         units: ``"m"`` or ``"rad"`` for each.
         values: of the stance itself (k,).
-        why_clear: why postures are solved one at a time; empty where the kernel does it.
+        fallback_reason: why postures are solved one at a time; empty where the kernel does it.
     """
 
     def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
@@ -71,12 +71,12 @@ class PostureChart:
         self.values = self._plan.given[self._plan.place]
         self.values.flags.writeable = False
         self._joints, self._rows_named = joint_units(stance), row_units(stance, self._plan)
-        self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
-        if not self.why_clear and importlib.util.find_spec("numba") is None:
-            self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
-        if not self.why_clear and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
-            self.why_clear = "the model's root is not the world"
-        if not self.why_clear:
+        self.fallback_reason = not_covered(stance.robot, tuple(stance.contacts))
+        if not self.fallback_reason and importlib.util.find_spec("numba") is None:
+            self.fallback_reason = 'Numba is not installed (pip install "copsense[fast]")'
+        if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
+            self.fallback_reason = "the model's root is not the world"
+        if not self.fallback_reason:
             self._layout = layout(stance, [np.zeros((0, 3)) for _ in stance.contacts])
             self._rows = rows(self._layout, stance.robot.model.nq)
             self._flat, self._search = plan_search(stance, self._layout, self._rows, self._plan)
@@ -108,7 +108,7 @@ class PostureChart:
         batch.reasons[:] = ""
         status = np.full(len(x), ELSEWHERE, dtype=np.int64)
         which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
-        if not self.why_clear and len(x):
+        if not self.fallback_reason and len(x):
             self._run(x, batch, status, which, excess, threads)
         for row in np.flatnonzero(status == ELSEWHERE):
             found = search_one(self.stance, self._plan, x[row])

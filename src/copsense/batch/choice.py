@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from copsense.criterion import Criterion, Quadratic
-from copsense.equilibrium import WrenchLaw
 from copsense.stance import Stance
+from copsense.statics import WrenchPolicy
 
 LEAST_WRENCH, LEAST_TORQUE, WEIGHTED = 0, 1, 2
 
@@ -32,7 +32,7 @@ class Choices(NamedTuple):
     moment: np.ndarray
 
 
-def choices(stance: Stance, criteria: Sequence[Criterion | WrenchLaw]) -> Choices:
+def choices(stance: Stance, criteria: Sequence[Criterion | WrenchPolicy]) -> Choices:
     """Those of some criteria that the kernel serves: diagonal torque weights, wrench norms."""
     column, kind, joint, force, moment = [], [], [], [], []
     for index, criterion in enumerate(criteria):

@@ -7,16 +7,16 @@ import numpy as np
 from copsense.batch.result import BatchResult, array_names
 from copsense.contact import half_planes
 from copsense.criterion import Criterion
-from copsense.equilibrium import WrenchLaw
 from copsense.errors import CopsenseError
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
+from copsense.statics import WrenchPolicy
 
 
 def fill_row(
     stance: Stance,
     q: np.ndarray,
-    criterion: Criterion | WrenchLaw,
+    criterion: Criterion | WrenchPolicy,
     result: BatchResult,
     row: int,
     column: int,

@@ -26,9 +26,9 @@ from copsense.batch.layout import layout, not_covered
 from copsense.batch.result import BatchResult, array_names, empty_result
 from copsense.batch.rows import rows
 from copsense.criterion import Criterion
-from copsense.equilibrium import WrenchLaw, law_name
 from copsense.errors import InvalidInputError
 from copsense.stance import Stance
+from copsense.statics import WrenchPolicy, policy_name
 
 _CHUNK = 512  # postures whose results stay in a core's cache
 _UNIT = 1e-6  # by which a quaternion may miss unit length, as in `Robot.check_configuration`
@@ -41,11 +41,12 @@ class BatchKernel:
         stance: gives robot and contacts; its configuration does not matter.
         criteria: the criteria or laws, of distinct names.
         gains: whether CoM gain and CoM travel are computed too.
-        why_clear: why the clear path answers everything; empty where the kernel does its part.
+        fallback_reason: why the reference answers everything; empty where the kernel does its
+            part.
     """
 
     def __init__(
-        self, stance: Stance, criteria: Sequence[Criterion | WrenchLaw], *, gains: bool = True
+        self, stance: Stance, criteria: Sequence[Criterion | WrenchPolicy], *, gains: bool = True
     ) -> None:
         """Check the criteria and lay the robot out.
 
@@ -55,7 +56,7 @@ class BatchKernel:
         if isinstance(criteria, Criterion):
             raise InvalidInputError("criteria is a single criterion. Give a list of them.")
         self.stance, self.criteria, self.gains = stance, tuple(criteria), gains
-        names = [str(c.name) if isinstance(c, Criterion) else law_name(c) for c in criteria]
+        names = [str(c.name) if isinstance(c, Criterion) else policy_name(c) for c in criteria]
         if not names or len(set(names)) != len(names):
             raise InvalidInputError(
                 f"a batch needs criteria of distinct names, got {', '.join(names) or 'none'}. "
@@ -66,16 +67,16 @@ class BatchKernel:
         self._nq = stance.robot.model.nq
         self._shapes = {name: a.shape for name, a in _arrays(self.empty(0)).items()}
         self._choices = choices(stance, self.criteria)
-        self.why_clear = not_covered(stance.robot, tuple(stance.contacts))
-        if not self.why_clear and importlib.util.find_spec("numba") is None:
-            self.why_clear = 'Numba is not installed (pip install "copsense[fast]")'
-        if not self.why_clear and not len(self._choices.column):
-            self.why_clear = "no criterion is a weighted norm of torques and wrenches"
-        if not self.why_clear:
+        self.fallback_reason = not_covered(stance.robot, tuple(stance.contacts))
+        if not self.fallback_reason and importlib.util.find_spec("numba") is None:
+            self.fallback_reason = 'Numba is not installed (pip install "copsense[fast]")'
+        if not self.fallback_reason and not len(self._choices.column):
+            self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
+        if not self.fallback_reason:
             self._layout = layout(stance, sole_edges(stance))
             self._rows = rows(self._layout, stance.robot.model.nq)
             if not len(self._layout.feet.support):
-                self.why_clear = "no joint moves between the contacts"
+                self.fallback_reason = "no joint moves between the contacts"
 
     def empty(self, count: int) -> BatchResult:
         """Arrays for the results of `count` postures, to be filled with ``out=``."""
@@ -94,7 +95,7 @@ class BatchKernel:
         threads = whole_number(threads, "threads")
         result = self.empty(len(q)) if out is None else self._fitting(out, len(q))
         doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
-        if not self.why_clear and len(q):
+        if not self.fallback_reason and len(q):
             self._run(q, result, doubtful, threads)
         reasons = {}
         for i, j in np.argwhere(doubtful):
@@ -137,7 +138,7 @@ class BatchKernel:
     def _single_kernel(self) -> Any:
         """What `one` runs: a kernel, or for the clear path alone a row to fill."""
         empty = self.empty(1)
-        if self.why_clear:
+        if self.fallback_reason:
             return empty
         from copsense.batch.single import Single
 
@@ -220,7 +221,7 @@ class BatchKernel:
 def evaluate_batch(
     stance: Stance,
     configurations: ArrayLike,
-    criteria: Sequence[Criterion | WrenchLaw],
+    criteria: Sequence[Criterion | WrenchPolicy],
     *,
     gains: bool = True,
     out: BatchResult | None = None,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from copsense.benchmark import Case, ControllerChoice, PostureChoice, Trial
+    from copsense.comparison import Case, ControllerChoice, PostureChoice, Trial
 
 _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torque_limit"
 
@@ -98,8 +98,8 @@ def benchmark(
     fails is a row with its reason. Stopped at any time, the same command goes on where it was.
     Exit code 1 where a run failed.
     """
-    from copsense.benchmark import read_plan, run_benchmark
-    from copsense.benchmark.run import check_plan, finished_scores
+    from copsense.comparison import read_plan, run_benchmark
+    from copsense.comparison.run import check_plan, finished_scores
     from copsense.storage import check_output
 
     if importlib.util.find_spec("mujoco") is None:
@@ -181,7 +181,7 @@ def _plan(
     quick: bool,
 ) -> tuple[Case, ...]:
     """The cases that the options ask for."""
-    from copsense.benchmark import ControllerChoice, PostureChoice, RobotChoice, make_plan
+    from copsense.comparison import ControllerChoice, PostureChoice, RobotChoice, make_plan
 
     within = read_limits(limits)
     controllers: list[ControllerChoice] = [
@@ -219,7 +219,7 @@ def _check_robots(plan: Sequence[Case]) -> None:
 
 
 def _posture(text: str) -> PostureChoice:
-    from copsense.benchmark import PostureChoice
+    from copsense.comparison import PostureChoice
 
     if text in ("own", "straight"):
         return PostureChoice(text, 0.0 if text == "straight" else None)
@@ -241,8 +241,8 @@ def _posture(text: str) -> PostureChoice:
 def _trials(
     texts: Sequence[str], repeats: int | None, seed: int | None, quick: bool
 ) -> dict[str, Trial]:
-    from copsense.benchmark import Breaking, Falls, Lean, PushToTip, Sway
-    from copsense.benchmark.trials import trial_named
+    from copsense.comparison import Breaking, Falls, Lean, PushToTip, Sway
+    from copsense.comparison.trials import trial_named
 
     found: dict[str, Trial] = {}
     for text in texts:
@@ -298,7 +298,7 @@ def _bar() -> Iterator[Any]:
 
 
 def _summary(plan: Sequence[Case], table: pd.DataFrame) -> dict[str, Any]:
-    from copsense.benchmark import CAVEAT, agreement, rank_controllers
+    from copsense.comparison import CAVEAT, agreement, rank_controllers
 
     return {
         "cases": len(plan),
@@ -311,7 +311,7 @@ def _summary(plan: Sequence[Case], table: pd.DataFrame) -> dict[str, Any]:
 
 
 def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
-    from copsense.benchmark import CAVEAT, agreement, rank_controllers, shown_unit
+    from copsense.comparison import CAVEAT, agreement, rank_controllers, shown_unit
 
     for (robot, posture, conditions, trial), rows in table.groupby(
         ["robot", "posture", "conditions", "trial"], sort=False

@@ -80,7 +80,7 @@ def design(
     """
     from copsense.design import design_criterion, families
     from copsense.limits import Limits
-    from copsense.motion import lateral_sweep
+    from copsense.path import lateral_sweep
     from copsense.storage import check_output
 
     if picture is not None:

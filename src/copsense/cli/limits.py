@@ -31,9 +31,9 @@ def add_limits(
 
     The changes are along the path's tangent, to either side, first order and exact.
     """
-    from copsense.equilibrium import ConstrainedEquilibrium
     from copsense.limits import torque_placeholders
     from copsense.margins import limit_margins, limit_travel
+    from copsense.statics import ConstrainedEquilibrium
 
     if limits.torque == "model" and torque_placeholders(stance):
         answer.setdefault("notes", []).append(
@@ -170,11 +170,11 @@ def add_regions(
     overwrite: bool,
 ) -> None:
     """The regions of the CoM that the limits leave, drawn with the soles and the lateral path."""
-    from copsense.motion import lateral_sweep
+    from copsense.path import lateral_sweep
     from copsense.plots import plot_regions, save_figure
     from copsense.plots.style import Figure
     from copsense.regions import com_region, criterion_region
-    from copsense.sweep import sweep
+    from copsense.sweeps import sweep
 
     regions = {"friction and soles": com_region(stance, replace(limits, torque=None))}
     if limits.torque is not None:

@@ -131,7 +131,7 @@ def map_command(
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)
     if not Path(output).exists():
-        why = BatchKernel(stance, chosen).why_clear
+        why = BatchKernel(stance, chosen).fallback_reason
         slow = f"postures are evaluated one at a time, milliseconds each: {why}" if why else ""
         for note in filter(None, (slow, height_advice(stance, sampling))):
             click.echo(f"note: {note}", err=True)

@@ -24,7 +24,7 @@ from copsense.cli.options import (
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from copsense.motion import Path as MotionPath
+    from copsense.path import PosturePath
     from copsense.stance import Stance
 
 _OVER_LIMIT = 1e-6  # rad: less is rounding
@@ -75,8 +75,8 @@ def sweep(
     """
     from copsense.recorded import with_limit_margins
     from copsense.storage import check_output, write_results
-    from copsense.sweep import failed_rows
-    from copsense.sweep import sweep as evaluate
+    from copsense.sweeps import failed_rows
+    from copsense.sweeps import sweep as evaluate
 
     if sum(what is not None for what in (com_y, joint, configurations)) != 1:
         raise InvalidInputError(
@@ -149,9 +149,9 @@ def plot(file: str, output: str | None, limits: str | None, force: bool) -> None
 
 def _read_path(
     stance: Stance, com_y: str | None, joint: str | None, configurations: str | None
-) -> MotionPath:
+) -> PosturePath:
     """The path that the options ask for."""
-    from copsense.motion import joint_sweep, lateral_sweep, path_through
+    from copsense.path import joint_sweep, lateral_sweep, path_through
     from copsense.storage import load_configurations
 
     if configurations is not None:

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError, UnreachablePostureError
-from copsense.motion import Path, lateral_sweep
+from copsense.path import PosturePath, lateral_sweep
 from copsense.stance import Stance
 
 _SPACING = 2e-3  # m between the postures of a lateral reference
@@ -167,7 +167,7 @@ class PathReference:
         signal: where along the path's coordinate to be at each time.
     """
 
-    def __init__(self, path: Path, signal: Signal) -> None:
+    def __init__(self, path: PosturePath, signal: Signal) -> None:
         """Prepare the interpolation.
 
         Raises:

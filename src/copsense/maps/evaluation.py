@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
-from copsense.equilibrium import solve_equilibrium
 from copsense.errors import CopsenseError, InfeasibleError
 from copsense.maps.columns import (
     EVALUATED,
@@ -19,6 +18,7 @@ from copsense.maps.columns import (
 )
 from copsense.maps.plan import MapPlan
 from copsense.margins import MarginTable, margin_table
+from copsense.statics import solve_equilibrium
 
 Chunk = dict[str, np.ndarray]
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from copsense.benchmark import CAVEAT, agreement, shown_unit
+from copsense.comparison import CAVEAT, agreement, shown_unit
 from copsense.plots.style import INK, MUTED, colours, new_figure, styled
 
 _ACROSS = 3  # panels in a row
@@ -24,7 +24,7 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
     """Draw a benchmark's table: simulated against predicted above, the controllers' scores below.
 
     Args:
-        table: what `copsense.benchmark.run_benchmark` or `load_benchmark` returns.
+        table: what `copsense.comparison.run_benchmark` or `load_benchmark` returns.
     """
     colour = colours(dict.fromkeys(table["controller"]))
     found = agreement(table)

@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from copsense.criterion import Criterion
-from copsense.equilibrium import WrenchLaw
 from copsense.errors import InvalidInputError
 from copsense.plots.reading import MM
 from copsense.plots.soles import draw_ground, frame_ground
 from copsense.plots.style import INK, new_figure, styled
 from copsense.sensitivity import CopSensitivity
 from copsense.stance import Stance
+from copsense.statics import WrenchPolicy
 
 _STEP = 20.0  # mm that the CoM moves for the arrows
 _FORWARD, _LEFT = "#009E73", "#CC79A7"
@@ -70,7 +70,7 @@ def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figu
     return figure
 
 
-def _name(criterion: Criterion | WrenchLaw) -> str:
+def _name(criterion: Criterion | WrenchPolicy) -> str:
     return criterion.name if isinstance(criterion, Criterion) else criterion.__name__
 
 

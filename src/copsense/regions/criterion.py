@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.criterion import Criterion
-from copsense.equilibrium import StaticEquilibrium, WrenchLaw, solve_equilibrium
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, limit_rows
 from copsense.regions.balance import com_axes, gravity_at
@@ -14,6 +13,7 @@ from copsense.regions.polygon import Point, clip
 from copsense.regions.region import BOX, ComRegion, region_between
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
+from copsense.statics import StaticEquilibrium, WrenchPolicy, solve_equilibrium
 
 _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 
@@ -21,7 +21,7 @@ Affine = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # f0, F, tau0, T
 
 
 def criterion_region(
-    stance: Stance, criterion: Criterion | WrenchLaw, limits: Limits, *, moving: bool = False
+    stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits, *, moving: bool = False
 ) -> ComRegion:
     """Where the CoM may be so that the criterion's own wrenches respect the limits.
 
@@ -74,7 +74,7 @@ def criterion_region(
 
 
 def _held_equilibrium(
-    stance: Stance, criterion: Criterion | WrenchLaw, axes: Float[np.ndarray, "2 r"]
+    stance: Stance, criterion: Criterion | WrenchPolicy, axes: Float[np.ndarray, "2 r"]
 ) -> Affine:
     """Forces and torques by the CoM's position along the axes, posture held: exactly affine."""
     if not isinstance(criterion, Criterion):
@@ -97,7 +97,7 @@ def _held_equilibrium(
 
 
 def _moving_equilibrium(
-    stance: Stance, criterion: Criterion | WrenchLaw, axes: Float[np.ndarray, "2 r"]
+    stance: Stance, criterion: Criterion | WrenchPolicy, axes: Float[np.ndarray, "2 r"]
 ) -> Affine:
     """The same to first order along the admissible motions that move the CoM."""
     found = cop_sensitivity(stance, criterion)

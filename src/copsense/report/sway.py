@@ -6,7 +6,7 @@ import math
 
 import pandas as pd
 
-from copsense.benchmark import CAVEAT, agreement, rank_scores, shown_unit
+from copsense.comparison import CAVEAT, agreement, rank_scores, shown_unit
 from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel, tracking_error
 from copsense.plots import plot_sway_cop, plot_sway_hip_roll, plot_sway_limits, plot_sway_load
 from copsense.plots.style import Figure

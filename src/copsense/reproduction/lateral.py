@@ -7,13 +7,13 @@ import pinocchio as pin
 import xarray as xr
 
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
-from copsense.motion import Path, joint_sweep, lateral_sweep
 from copsense.paper.lateral import HIP_ROLL, SHORT, TORQUE, WRENCH
+from copsense.path import PosturePath, joint_sweep, lateral_sweep
 from copsense.reproduction.clock import Clock
 from copsense.reproduction.result import UnitOfLength
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
-from copsense.sweep import sweep
+from copsense.sweeps import sweep
 
 PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 _LENGTHS = 25  # values of L in the figure on the unit of length
@@ -26,7 +26,7 @@ def paper_criteria() -> list[Criterion]:
 
 def sweep_sideways(
     stance: Stance, postures: int, clock: Clock, name: str
-) -> tuple[xr.Dataset, Path]:
+) -> tuple[xr.Dataset, PosturePath]:
     """The CoM from over the right foot to over the left, every criterion at every posture."""
     half = feet_distance(stance) / 2
     with clock.stage(f"{name}: postures", postures) as advance:
@@ -92,5 +92,5 @@ def _facts(stance: Stance, criterion: Criterion) -> dict[str, float]:
 def _joint_path_slope(stance: Stance, criterion: Criterion) -> float:
     """D left CoP y / d hip roll [m/rad] where the joint itself is swept and the CoM left free."""
     now = stance.robot.joint_position(stance.q, HIP_ROLL)
-    path: Path = joint_sweep(stance, HIP_ROLL, now, now, 1)
+    path: PosturePath = joint_sweep(stance, HIP_ROLL, now, now, 1)
     return float(cop_sensitivity(path.stances[0], criterion).along(path.tangents[0])[0, 1])

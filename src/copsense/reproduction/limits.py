@@ -6,17 +6,19 @@ from dataclasses import replace
 
 from copsense.binding import next_change
 from copsense.limits import Limits
-from copsense.motion import Path
+from copsense.path import PosturePath
 from copsense.recorded import with_limit_margins
 from copsense.regions import com_region, criterion_region
 from copsense.reproduction.clock import Clock
 from copsense.reproduction.lateral import paper_criteria
 from copsense.reproduction.result import WithinLimits
 from copsense.stance import Stance
-from copsense.sweep import sweep
+from copsense.sweeps import sweep
 
 
-def solve_within_limits(stance: Stance, path: Path, limits: Limits, clock: Clock) -> WithinLimits:
+def solve_within_limits(
+    stance: Stance, path: PosturePath, limits: Limits, clock: Clock
+) -> WithinLimits:
     """The lateral sweep within limits, where they first bind, and the regions that they leave."""
     criteria = paper_criteria()
     with clock.stage("limits: sensitivities", len(path)) as advance:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from copsense.equilibrium import solve_equilibrium
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
 from copsense.paper import (
@@ -35,6 +34,7 @@ from copsense.reproduction.sway import sway_in_simulation
 from copsense.reproduction.trials import benchmark_in_simulation
 from copsense.robots import load_stance
 from copsense.stance import Stance
+from copsense.statics import solve_equilibrium
 
 # What public balancing configurations for this robot use: mu = 1/3, torsion 1/75 m, f_z over 10 N.
 LIMITS = Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")

@@ -74,7 +74,7 @@ class Reproduction:
         unit_of_length: criterion 1's dependence on L.
         within_limits: the same path within limits, and the regions that they leave the CoM.
         sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
-        benchmark: leans, pushes and a sway under both criteria, as `copsense.benchmark` tells
+        benchmark: leans, pushes and a sway under both criteria, as `copsense.comparison` tells
             them; None where the closed loop was left out.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.

@@ -6,7 +6,7 @@ import os
 
 import pandas as pd
 
-from copsense.benchmark import (
+from copsense.comparison import (
     ControllerChoice,
     Lean,
     PostureChoice,

@@ -16,10 +16,10 @@ from copsense.contact import Contact, half_planes
 from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
-from copsense.equilibrium import solve_equilibrium
 from copsense.limits import Limits
 from copsense.simulation.settings import PhysicsSettings
 from copsense.stance import Stance
+from copsense.statics import solve_equilibrium
 
 
 @dataclass(frozen=True, eq=False)

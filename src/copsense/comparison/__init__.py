@@ -1,0 +1,60 @@
+"""Benchmark: how far a controller leans, or is pushed, before a foot tips, beside the prediction.
+
+A plan is a set of cases: robot, posture, controller, conditions and trial, each a value. A case
+gives scores, a score is a row of one table, and a run that fails is a row with its reason. The
+prediction uses the law that the controller applies: it tells theory from physics, and ranks
+controllers by what physics says. Falls are scored with limits only, as a rate over perturbed
+repeats: without limits they follow chance more than the criterion.
+"""
+
+from copsense.comparison.cases import Case, Conditions, ControllerChoice, PostureChoice, RobotChoice
+from copsense.comparison.intervals import fisher_interval, wilson_interval
+from copsense.comparison.plan import make_plan, read_plan
+from copsense.comparison.prediction import predict_impulse
+from copsense.comparison.ranking import CAVEAT, agreement, rank_controllers, rank_scores
+from copsense.comparison.run import run_benchmark, run_case
+from copsense.comparison.score import Score
+from copsense.comparison.table import load_benchmark
+from copsense.comparison.trials import (
+    SCORES,
+    Breaking,
+    Falls,
+    Lean,
+    PushToTip,
+    Rest,
+    ScoreKind,
+    Sway,
+    Trial,
+    shown_unit,
+)
+
+__all__ = [
+    "CAVEAT",
+    "SCORES",
+    "Breaking",
+    "Case",
+    "Conditions",
+    "ControllerChoice",
+    "Falls",
+    "Lean",
+    "PostureChoice",
+    "PushToTip",
+    "Rest",
+    "RobotChoice",
+    "Score",
+    "ScoreKind",
+    "Sway",
+    "Trial",
+    "agreement",
+    "fisher_interval",
+    "load_benchmark",
+    "make_plan",
+    "predict_impulse",
+    "rank_controllers",
+    "rank_scores",
+    "read_plan",
+    "run_benchmark",
+    "run_case",
+    "shown_unit",
+    "wilson_interval",
+]

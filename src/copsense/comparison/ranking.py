@@ -1,0 +1,139 @@
+"""Ranking: which controller is better, as far as the scores can tell; and theory beside physics."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from copsense.comparison.intervals import fisher_interval
+from copsense.comparison.trials import SCORES
+
+CAVEAT = (
+    "Prediction and controller share the law that shares the load: the agreement holds the theory "
+    "against physics, and says nothing of a controller that follows another law."
+)
+"""To be said wherever the agreement is."""
+
+_SETTING = ["robot", "posture", "conditions", "trial", "score"]
+# Scores that tell theory from physics; the others have no prediction, or one of zero.
+_COMPARED = (
+    "tip_excursion",
+    "tip_impulse",
+    "smallest_margin",
+    "torque_norm",
+    "torque_peak",
+    "breaking_torque_limit",
+)
+
+
+def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
+    """The controllers' ranks in each setting (robot, posture, conditions, trial) and score.
+
+    A controller's rank is 1 plus the number of those clearly better: whose interval lies wholly
+    beyond its own. Within their resolution controllers share a rank. A run that failed
+    or tipped too early comes last; where every one did, or nothing can be measured, none is ranked.
+
+    Returns:
+        The rows of the table that are ranked with ``rank`` and ``of``, the number of controllers in
+        the setting.
+    """
+    told = ~table["status"].isin(["failed", "tipped", "none"])
+    some = told.groupby([table[name] for name in _SETTING]).transform("any")
+    ranked = table[some & (table["status"] != "none")].copy()
+    ranked["rank"], ranked["of"] = 1, 1
+    for (*_, score), rows in ranked.groupby(_SETTING, sort=False):
+        larger = SCORES[str(score)].larger
+        failed = rows["status"].isin(["failed", "tipped"]).to_numpy()
+        # Better is larger from here on.
+        low = (rows["low"] if larger else -rows["high"]).to_numpy()
+        high = (rows["high"] if larger else -rows["low"]).to_numpy()
+        low, high = np.where(failed, -np.inf, low), np.where(failed, -np.inf, high)
+        beaten = (low[None, :] > high[:, None]) | (failed[:, None] & ~failed[None, :])
+        ranked.loc[rows.index, "rank"] = 1 + beaten.sum(axis=1)
+        ranked.loc[rows.index, "of"] = len(rows)
+    return ranked
+
+
+def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
+    """How the controllers compare in each trial's scores, over all settings.
+
+    Only settings in which every controller of the trial was tried count, where there is one.
+
+    Returns:
+        A row for each trial, score and controller, the best first, with ``mean_rank``, ``wins``
+        (settings in which none is better), ``settings``, ``failures`` (of these, failed or tipped),
+        and ``mean`` of the values (NaN where one was not measured).
+    """
+    ranked, rows = rank_scores(table), []
+    for (trial, score), group in ranked.groupby(["trial", "score"], sort=False):
+        most = group["of"].max()
+        shared = group[group["of"] == most]
+        for controller, own in shared.groupby("controller", sort=False):
+            measured = (own["status"] == "measured").all()
+            rows.append(
+                {
+                    "trial": trial,
+                    "score": score,
+                    "unit": SCORES[str(score)].unit,
+                    "controller": controller,
+                    "mean_rank": float(own["rank"].mean()),
+                    "wins": int((own["rank"] == 1).sum()),
+                    "settings": len(own),
+                    "failures": int(own["status"].isin(["failed", "tipped"]).sum()),
+                    "mean": float(own["value"].mean()) if measured else np.nan,
+                }
+            )
+    columns = ["trial", "score", "unit", "controller", "mean_rank", "wins", "settings"]
+    found = pd.DataFrame(rows, columns=[*columns, "failures", "mean"])
+    keys = list(zip(found["trial"], found["score"], strict=True))
+    order = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    found["_order"] = [order[key] for key in keys]
+    found = found.sort_values(["_order", "mean_rank"], kind="stable")
+    return found.drop(columns="_order").reset_index(drop=True)
+
+
+def _own(parameters: str) -> bool:
+    """Whether a case's controller is somebody's own."""
+    return bool(parameters and json.loads(parameters)["controller"].get("source"))
+
+
+def agreement(table: pd.DataFrame) -> pd.DataFrame:
+    """How well the predictions hold, over the rows that were measured. See `CAVEAT`.
+
+    Controllers of one's own are left out: the prediction only assumes their law.
+
+    Returns:
+        A row per score and prediction (``"path"``, exact, or ``"first order"``): ``cases``, mean
+        and largest absolute error in the score's unit, Pearson's ``correlation`` with the ends
+        ``low`` and ``high`` of its 95 % interval (Fisher's z; NaN under four cases).
+    """
+    rows, table = [], table[~table["parameters"].map(_own)]
+    for score in _COMPARED:
+        of_score = table[(table["score"] == score) & (table["status"] == "measured")]
+        for prediction, column in (("path", "predicted"), ("first order", "first_order")):
+            known = of_score[np.isfinite(of_score[column].astype(float))]
+            if not len(known):
+                continue
+            x, y = known[column].to_numpy(float), known["value"].to_numpy(float)
+            error = np.abs(y - x)
+            r = np.nan
+            if len(known) > 2 and np.ptp(x) > 0 and np.ptp(y) > 0:
+                r = float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
+            low, high = fisher_interval(r, len(known))
+            rows.append(
+                {
+                    "score": score,
+                    "unit": SCORES[score].unit,
+                    "prediction": prediction,
+                    "cases": len(known),
+                    "mean_error": float(error.mean()),
+                    "largest_error": float(error.max()),
+                    "correlation": r,
+                    "low": low,
+                    "high": high,
+                }
+            )
+    columns = ["score", "unit", "prediction", "cases", "mean_error", "largest_error"]
+    return pd.DataFrame(rows, columns=[*columns, "correlation", "low", "high"])

@@ -1,0 +1,330 @@
+"""Trials: what a robot is put through, as values; and the scores that each trial gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from copsense.arrays import finite_number
+from copsense.comparison.building import check_fields
+from copsense.comparison.intervals import count_steps
+from copsense.errors import InvalidInputError, UnknownNameError
+
+
+@dataclass(frozen=True)
+class ScoreKind:
+    """What a score's number is.
+
+    Attributes:
+        unit: of value, interval and predictions.
+        larger: whether a larger value is the better one.
+        meaning: in words.
+        resolution: differences below are the engine's, not the controller's: a sole sinks by
+            0.02 mm into the ground of a simulation.
+    """
+
+    unit: str
+    larger: bool
+    meaning: str
+    resolution: float = 0.0
+
+
+SCORES = {
+    "tip_excursion": ScoreKind("m", True, "CoM y from the start at the first tip of a lean", 2e-5),
+    "tip_impulse": ScoreKind("N s", True, "least lateral push that tips a contact"),
+    "smallest_margin": ScoreKind("m", True, "smallest distance of a CoP to its sole's edge", 2e-5),
+    "com_error": ScoreKind("m", False, "root mean square of CoM y minus its target", 1e-6),
+    "torque_norm": ScoreKind("N m", False, "mean over time of the norm of the joint torques", 1e-2),
+    "torque_peak": ScoreKind("N m", False, "largest joint torque", 1e-2),
+    "fall_rate": ScoreKind("1", False, "share of perturbed pushes that end in a fall"),
+    "wrench_error": ScoreKind("1", False, "wrench at rest off the static one, per weight", 1e-4),
+    "cop_error": ScoreKind("m", False, "measured CoP off the commanded one in steady state", 2e-5),
+    "breaking_delay": ScoreKind("s", True, "torque delay at which a sway first tips a contact"),
+    "breaking_bandwidth": ScoreKind("Hz", False, "torque bandwidth at which a sway first tips"),
+    "breaking_velocity_noise": ScoreKind(
+        "rad/s", True, "noise of the joint velocities at which a sway first tips a contact"
+    ),
+    "breaking_torque_limit": ScoreKind(
+        "N m", False, "torque limit of the legs at which a sway first tips a contact"
+    ),
+}
+"""What each score is."""
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit in which a score is shown, and the factor to it: lengths in millimetres."""
+    return ("mm", 1e3) if unit == "m" else (unit, 1.0)
+
+
+def _check_side(side: str) -> None:
+    if side not in ("left", "right"):
+        raise UnknownNameError("side", side, ("left", "right"))
+
+
+@dataclass(frozen=True)
+class Lean:
+    """A slow lateral lean until a contact tips.
+
+    Attributes:
+        reach: how far to lean [m]; None until the CoM is over the foot, or as far as it gets.
+        speed: of the CoM [m/s].
+        side: ``"left"`` or ``"right"``.
+    """
+
+    reach: float | None = None
+    speed: float = 5e-3
+    side: str = "left"
+
+    kind: ClassVar[str] = "lean"
+    scores: ClassVar[tuple[str, ...]] = ("tip_excursion",)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no lean."""
+        if self.reach is not None:
+            finite_number(self.reach, "the reach of a lean [m]", positive=True)
+        finite_number(self.speed, "the speed of a lean [m/s]", positive=True)
+        _check_side(self.side)
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate, roughly [s]."""
+        return (self.reach or 0.06) / self.speed + 1.0
+
+
+@dataclass(frozen=True)
+class PushToTip:
+    """Lateral pushes on the base, bisected for the least that tips a contact.
+
+    Attributes:
+        resolution: bisect until the two ends are within twice this [N s].
+        largest: impulse to try first [N s]; None for what gives the CoM 0.5 m/s.
+        duration: of each push [s].
+        side: ``"left"`` or ``"right"``.
+    """
+
+    resolution: float = 0.05
+    largest: float | None = None
+    duration: float = 0.05
+    side: str = "left"
+
+    kind: ClassVar[str] = "push"
+    scores: ClassVar[tuple[str, ...]] = ("tip_impulse",)
+
+    def __post_init__(self) -> None:
+        """Refuse what is no push."""
+        finite_number(self.resolution, "the resolution of a push [N s]", positive=True)
+        if self.largest is not None:
+            finite_number(self.largest, "the largest push [N s]", positive=True)
+            count_steps(0.0, self.largest, 2 * self.resolution)
+        finite_number(self.duration, "the duration of a push [s]", positive=True)
+        _check_side(self.side)
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate, roughly [s]."""
+        return 7.0
+
+
+@dataclass(frozen=True)
+class Sway:
+    """A sinusoidal lateral sway, the same motion for every controller.
+
+    The first 0.1 s (a fifth, where it is shorter) is not scored: the ground takes up the weight.
+
+    Attributes:
+        amplitude: of CoM y [m]; a negative one starts to the right.
+        frequency: [Hz].
+        periods: how many.
+    """
+
+    amplitude: float = 0.02
+    frequency: float = 0.1
+    periods: float = 1.0
+
+    kind: ClassVar[str] = "sway"
+    scores: ClassVar[tuple[str, ...]] = (
+        "smallest_margin",
+        "com_error",
+        "torque_norm",
+        "torque_peak",
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what is no sway."""
+        finite_number(self.amplitude, "the amplitude of a sway [m]")
+        finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
+        finite_number(self.periods, "the periods of a sway", positive=True)
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate [s]."""
+        return self.periods / self.frequency
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Standing still: what physics measures beside what the statics say.
+
+    Attributes:
+        duration: how long [s]; the last fifth is measured.
+    """
+
+    duration: float = 2.0
+
+    kind: ClassVar[str] = "rest"
+    scores: ClassVar[tuple[str, ...]] = ("wrench_error", "cop_error")
+
+    def __post_init__(self) -> None:
+        """Refuse what is no time."""
+        finite_number(self.duration, "the duration of a rest [s]", positive=True)
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate [s]."""
+        return self.duration
+
+
+@dataclass(frozen=True)
+class Falls:
+    """Perturbed lateral pushes; how many end in a fall. Needs limits.
+
+    Each repeat draws when the push comes (up to half a second later), to which side, and the noise
+    of the joint sensors.
+
+    Attributes:
+        velocity: what each push gives the CoM, impulse per mass [m/s].
+        repeats: how many pushes.
+        duration: of each push [s].
+        position_noise: standard deviation of the joint positions [rad].
+        velocity_noise: of the joint velocities [rad/s].
+        watch: time after a push in which a fall counts [s].
+        seed: of everything random.
+    """
+
+    velocity: float = 0.14
+    repeats: int = 20
+    duration: float = 0.05
+    position_noise: float = 1e-4
+    velocity_noise: float = 1e-2
+    watch: float = 2.0
+    seed: int = 0
+
+    kind: ClassVar[str] = "falls"
+    scores: ClassVar[tuple[str, ...]] = ("fall_rate",)
+
+    def __post_init__(self) -> None:
+        """Refuse what counts nothing."""
+        for name in ("velocity", "duration", "watch"):
+            finite_number(getattr(self, name), f"the {name} of the falls", positive=True)
+        for name in ("repeats", "seed"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < (1 if name == "repeats" else 0):
+                raise InvalidInputError(
+                    f"the {name} of the falls is {value!r}. Give a whole number"
+                    + (", 1 or more." if name == "repeats" else ".")
+                )
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate, roughly [s]."""
+        return self.repeats * (self.watch + 0.5)
+
+
+# parameter -> (mild, severe, step); a step is twice the resolution
+_RANGES = {
+    "delay": (0.0, 0.05, 1e-3),
+    "bandwidth": (50.0, 0.5, 0.5),
+    "velocity_noise": (0.0, 3.0, 0.1),
+    "torque_limit": (60.0, 0.5, 0.5),
+}
+
+
+@dataclass(frozen=True)
+class Breaking:
+    """A sway under ever worse motors or sensors, bisected for where a contact first tips.
+
+    Attributes:
+        parameter: ``"delay"`` [s] or ``"bandwidth"`` [Hz] of the torques, ``"velocity_noise"``
+            of the joints [rad/s], or ``"torque_limit"`` of the legs [Nm].
+        mild: a value that should be survived; None for a usual one.
+        severe: a value that should not.
+        step: of the values tried; the resolution is half of it.
+        amplitude: of the sway [m].
+        frequency: of the sway [Hz]; it lasts one period.
+    """
+
+    parameter: str = "delay"
+    mild: float | None = None
+    severe: float | None = None
+    step: float | None = None
+    amplitude: float = 0.02
+    frequency: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Fill in the usual range, and refuse what is none."""
+        if self.parameter not in _RANGES:
+            raise UnknownNameError("parameter to break", self.parameter, _RANGES)
+        for name, usual in zip(("mild", "severe", "step"), _RANGES[self.parameter], strict=True):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, usual)
+            finite_number(getattr(self, name), f"{name} of the {self.parameter}")
+        finite_number(self.step, f"the step of the {self.parameter}", positive=True)
+        count_steps(self.mild, self.severe, self.step)  # type: ignore[arg-type]
+        rises = _RANGES[self.parameter][0] < _RANGES[self.parameter][1]
+        ends = (self.mild, self.severe) if rises else (self.severe, self.mild)
+        if not 0 <= ends[0] < ends[1] or (ends[0] == 0 and not rises):  # type: ignore[operator]
+            order = "0 or more, severe over mild" if rises else "over 0, severe under mild"
+            raise InvalidInputError(
+                f"the {self.parameter} from mild = {self.mild:g} to severe = {self.severe:g} gets "
+                f"no worse. Give both {order}."
+            )
+        finite_number(self.amplitude, "the amplitude of a sway [m]")
+        finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
+
+    @property
+    def kind(self) -> str:
+        """As a plan calls it."""
+        return self.parameter
+
+    @property
+    def scores(self) -> tuple[str, ...]:
+        """Names of the scores."""
+        return (f"breaking_{self.parameter}",)
+
+    @property
+    def seconds(self) -> float:
+        """Motion to simulate, roughly [s]."""
+        return 5.0 / self.frequency
+
+
+Trial = Lean | PushToTip | Sway | Rest | Falls | Breaking
+"""What a case does; another trial is another value here, and a function in `score`."""
+
+KINDS: dict[str, type[Lean | PushToTip | Sway | Rest | Falls | Breaking]] = {
+    "lean": Lean,
+    "push": PushToTip,
+    "sway": Sway,
+    "rest": Rest,
+    "falls": Falls,
+    **dict.fromkeys(_RANGES, Breaking),
+}
+
+
+def trial_named(kind: str, /, **options: object) -> Trial:
+    """A trial by the name that plans and the command give it.
+
+    Raises:
+        UnknownNameError: no such trial, or no such option of it.
+        InvalidInputError: an option's value means nothing.
+    """
+    if kind not in KINDS:
+        raise UnknownNameError("disturbance", kind, KINDS)
+    cls = KINDS[kind]
+    known = [field.name for field in fields(cls) if field.name != "parameter"]  # the kind says it
+    check_fields(cls, options)
+    for name in options:
+        if name not in known:
+            raise UnknownNameError(f"option of the trial {kind!r}", name, known)
+    if cls is Breaking:
+        options = {"parameter": kind} | options
+    return cls(**options)  # type: ignore[arg-type]

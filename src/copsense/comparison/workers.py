@@ -1,0 +1,132 @@
+"""Workers: cases over processes; one that dies takes only its own case with it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from copsense.comparison.cases import Case
+from copsense.comparison.score import Score, failed
+
+# The matrices are small: more threads than one cost more than they bring, and change sums' order.
+_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+Run = Callable[[Case, Callable[[float], object] | None], list[Score]]
+
+
+def run_here(
+    cases: Sequence[Case], run: Run, progress: Callable[[Case, float], object]
+) -> Iterator[tuple[Case, list[Score]]]:
+    """Run cases in this process, in turn."""
+    with threadpool_limits(limits=1, user_api="blas"):
+        for case in cases:
+            yield case, run(case, lambda seconds, case=case: progress(case, seconds))  # type: ignore[misc]
+
+
+def run_in_processes(
+    cases: Sequence[Case], run: Run, jobs: int, progress: Callable[[Case, float], object]
+) -> Iterator[tuple[Case, list[Score]]]:
+    """Run cases in `jobs` processes, and yield each as it is done.
+
+    Whatever ends the iteration (an interrupt, too) ends the processes. One that dies, as in a
+    crash of a library, gives its case a failed row and is replaced.
+    """
+    waiting = list(reversed(cases))
+    crew: dict[Connection, _Worker] = {}
+    try:
+        while waiting or crew:
+            while waiting and len(crew) < jobs:
+                worker = _Worker(run)
+                crew[worker.link] = worker
+                worker.give(waiting.pop())
+            for link in wait(list(crew)):
+                worker = crew[link]  # type: ignore[index]
+                try:
+                    answer = worker.link.recv()
+                except (EOFError, OSError):
+                    del crew[worker.link]
+                    yield worker.case, failed(worker.case.trial.scores, worker.epitaph())
+                    continue
+                if isinstance(answer, float):
+                    progress(worker.case, answer)
+                    continue
+                yield worker.case, answer
+                if waiting:
+                    worker.give(waiting.pop())
+                else:
+                    del crew[worker.link]
+                    worker.dismiss()
+    finally:
+        for worker in crew.values():
+            worker.process.terminate()
+            worker.process.join()
+
+
+class _Worker:
+    """A process, the link to it, and what it is at."""
+
+    case: Case
+
+    def __init__(self, run: Run) -> None:
+        # Spawned, not forked: a copy of a process with threads may hang.
+        context = multiprocessing.get_context("spawn")
+        self.link, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs, run), daemon=True)
+        with _one_thread():
+            self.process.start()
+        theirs.close()
+
+    def give(self, case: Case) -> None:
+        """Have it run a case."""
+        self.case = case
+        try:
+            self.link.send(case)
+        except OSError:  # it has died: reading from it will tell
+            return
+
+    def dismiss(self) -> None:
+        """Let it go."""
+        self.link.close()
+        self.process.join()
+
+    def epitaph(self) -> str:
+        """Why it died."""
+        self.link.close()
+        self.process.join()
+        code = self.process.exitcode
+        if code is not None and code < 0:
+            return f"the process was ended by {signal.Signals(-code).name}"
+        return f"the process ended with exit code {code}"
+
+
+def _work(link: Any, run: Run) -> None:
+    """Answer cases with scores until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent says when to stop
+    with threadpool_limits(limits=1, user_api="blas"):
+        try:
+            while True:
+                link.send(run(link.recv(), link.send))
+        except (EOFError, OSError):
+            return
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes started inside load their BLAS with one thread."""
+    before = {name: os.environ.get(name) for name in _ONE_THREAD}
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,61 @@
+"""Equilibrium: the wrenches and torques that a criterion chooses, within limits or without."""
+
+from __future__ import annotations
+
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError
+from copsense.limits import Limits
+from copsense.stance import Stance
+from copsense.statics.constrained import (
+    ActiveLimit,
+    ActiveSetChange,
+    ConstrainedEquilibrium,
+    Rates,
+    distance_to_change,
+    solve_constrained,
+)
+from copsense.statics.equilibrium import PROJECT, StaticEquilibrium, is_admissible, solve_static
+from copsense.statics.policy import WrenchPolicy, policy_name, wrench_policy
+
+__all__ = [
+    "PROJECT",
+    "ActiveLimit",
+    "ActiveSetChange",
+    "ConstrainedEquilibrium",
+    "Rates",
+    "StaticEquilibrium",
+    "WrenchPolicy",
+    "distance_to_change",
+    "is_admissible",
+    "policy_name",
+    "solve_equilibrium",
+    "wrench_policy",
+]
+
+
+def solve_equilibrium(
+    stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits | None = None
+) -> StaticEquilibrium:
+    """The static equilibrium that a criterion chooses ([Romano2016] Eq. (7), (9), Remark 4).
+
+    Args:
+        stance: robot, configuration and contacts.
+        criterion: a `Criterion`, or a callable q -> wrenches (nc, 6) in contact axes, such as a
+            controller's own.
+        limits: what the wrenches and torques must respect; None for nothing. With limits the
+            answer is a `ConstrainedEquilibrium`.
+
+    Raises:
+        UndeterminedWrenchError: several wrenches are equally good; the message names them.
+        InfeasibleError: no wrench respects the limits.
+        InvalidInputError: weights that do not fit, a law whose wrenches do not balance gravity, or
+            a law together with limits.
+    """
+    if limits is None or not limits.any:
+        return solve_static(stance, criterion)
+    if not isinstance(criterion, Criterion):
+        raise InvalidInputError(
+            "limits apply to a Criterion; a law q -> wrenches has to respect them itself. Leave "
+            "limits out, and look at its margins."
+        )
+    return solve_constrained(stance, criterion, limits)

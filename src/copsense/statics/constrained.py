@@ -1,0 +1,394 @@
+"""Constrained equilibrium: a criterion's wrenches within limits, and their one-sided derivatives.
+
+Over the contact forces alone, tau = G_j - J_j' f, a criterion within limits is the QP
+
+    minimise 1/2 f' H f - g' f   subject to   J_b' f = G_b,   A f <= b,
+    H = J_j W_tau J_j' + W_f,    g = J_j W_tau G_j + W_f f_ref,
+
+with a row of A for each contact limit and, for a torque limit |tau_i| <= t_i, the rows
+-/+ J_i' f <= t_i -/+ G_i. With the active rows held, f and its multipliers solve
+
+    [ 0     J_b'   0  ] [nu_b]   [ G_b ]
+    [ J_b  -H    -A_a'] [ f  ] = [ -g  ]
+    [ 0    -A_a    0  ] [ l  ]   [-b_a ]
+
+and along an admissible V the same matrix gives the derivatives. Where a row is weakly active (on
+its bound without pressing) the derivative depends on the side. It is the optimum of a QP of its
+own: same cost, the pressing rows held, and the weak ones not to be crossed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from copsense.criterion import Criterion, Quadratic
+from copsense.errors import (
+    InfeasibleError,
+    InvalidInputError,
+    UndeterminedWrenchError,
+    UnsolvedError,
+)
+from copsense.limits import LimitRows, Limits, limit_rows
+from copsense.stance import Stance
+from copsense.statics.equilibrium import StaticEquilibrium
+from copsense.statics.qp import NoPointError, Program
+
+_PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
+_TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
+_RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
+_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that is no approach
+_SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
+
+
+@dataclass(frozen=True)
+class ActiveLimit:
+    """A limit that holds with equality.
+
+    Attributes:
+        name: such as ``"l_sole: CoP at the +y (left) edge"`` or ``"torque of l_knee"``.
+        kind: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"``, ``"wrench cone"`` or
+            ``"torque"``.
+        multiplier: how hard the criterion presses against it; 0 where it only touches.
+    """
+
+    name: str
+    kind: str
+    multiplier: float
+
+    @property
+    def weak(self) -> bool:
+        """Whether the limit is only touched, so that the two sides differ."""
+        return self.multiplier == 0.0
+
+
+@dataclass(frozen=True)
+class ActiveSetChange:
+    """The next limit to begin or cease to press along a motion, to first order.
+
+    Attributes:
+        name: the limit's name.
+        kind: as of `ActiveLimit`.
+        binds: whether it begins to bind; False where it lets go.
+        travel: how far along the motion, in units of it.
+    """
+
+    name: str
+    kind: str
+    binds: bool
+    travel: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """One-sided derivatives of a constrained equilibrium along a motion.
+
+    Attributes:
+        forces: d f (m,).
+        torques: d tau (n,).
+        multipliers: d l (r,), zero where a row stays inactive.
+        slack: d (b - A f) (r,).
+    """
+
+    forces: Float[np.ndarray, " m"]
+    torques: Float[np.ndarray, " n"]
+    multipliers: Float[np.ndarray, " r"]
+    slack: Float[np.ndarray, " r"]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstrainedEquilibrium(StaticEquilibrium):
+    """An equilibrium within limits; see `StaticEquilibrium` for the rest.
+
+    Attributes:
+        limits: the limits.
+        names: what each row limits (r,).
+        kinds: the kind of each row (r,).
+        slack: b - A f (r,), non-negative [N, Nm].
+        row_multipliers: l (r,), non-negative, zero off the active rows.
+    """
+
+    limits: Limits
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    slack: Float[np.ndarray, " r"]
+    row_multipliers: Float[np.ndarray, " r"]
+
+    @property
+    def active(self) -> tuple[ActiveLimit, ...]:
+        """The limits that hold with equality, the hardest pressed first."""
+        touching = np.flatnonzero(self._problem.strong | self._problem.weak)
+        order = sorted(touching, key=lambda i: -self.row_multipliers[i])
+        return tuple(
+            ActiveLimit(self.names[i], self.kinds[i], float(self.row_multipliers[i])) for i in order
+        )
+
+    def optimality(self) -> float:
+        """Largest violation of the QP's optimality conditions.
+
+        Balance and limits in shares of the weight, stationarity and complementarity in shares of
+        the cost's gradient; recomputed from the stance.
+        """
+        return self._problem.optimality(self)
+
+    def derivative(
+        self, directions: Float[np.ndarray, "nv p"]
+    ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
+        """Derivatives with the pressing limits held, and the touching ones ignored.
+
+        Where nothing only touches this is the derivative; elsewhere use `rates`.
+        """
+        solved = self._problem.differentiate(self, directions, np.flatnonzero(self._problem.strong))
+        return solved[0], solved[1]
+
+    def pressing_after(self, direction: Float[np.ndarray, " nv"]) -> Int[np.ndarray, " a"]:
+        """Rows that press once an admissible motion has begun."""
+        pushes = self._problem.weak & (self.rates(direction).multipliers > 0)
+        return np.flatnonzero(self._problem.strong | pushes)
+
+    def rates(self, direction: Float[np.ndarray, " nv"]) -> Rates:
+        """The one-sided derivative along an admissible motion: what happens when it begins."""
+        return self._problem.rates(self, direction)
+
+    def next_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
+        """The first change of the pressing limits along an admissible motion, to first order.
+
+        The ratio test: a limit off its bound closes in at the rate of its slack (a centre of
+        pressure at that of its distance to the edge), a pressing one eases at the rate of its
+        multiplier. What is only touched here has taken a side already. None if nothing closes in.
+        """
+        rates = self.rates(direction)
+        strong, touching = self._problem.strong, self._problem.strong | self._problem.weak
+        slack, closing = self.slack, -rates.slack
+        # (s / f_z)' = (s' - (s / f_z) f_z') / f_z, here as the rate of s that has the same ratio.
+        normal = self._problem.normal
+        cop = np.flatnonzero(normal >= 0)
+        fz = normal[cop]
+        closing[cop] += slack[cop] * rates.forces[fz] / self.forces[fz]
+        left = np.where(touching, self.row_multipliers, slack)
+        closing = np.where(touching, -rates.multipliers, closing)
+        nearer = (closing > _CLOSING * np.abs(left)) & (strong | ~touching)
+        if not np.any(nearer):
+            return None
+        travel = np.where(nearer, left / np.where(nearer, closing, 1.0), np.inf)
+        i = int(np.argmin(travel))
+        return ActiveSetChange(self.names[i], self.kinds[i], not strong[i], float(travel[i]))
+
+    @cached_property
+    def _problem(self) -> _Problem:
+        assert isinstance(self.criterion, Criterion)
+        return _Problem(self.stance, self.criterion, self.limits)
+
+
+def solve_constrained(
+    stance: Stance, criterion: Criterion, limits: Limits
+) -> ConstrainedEquilibrium:
+    """The equilibrium that a criterion chooses within limits.
+
+    Args:
+        stance: robot, configuration and contacts.
+        criterion: what to minimise.
+        limits: what to respect.
+
+    Raises:
+        InfeasibleError: no wrench respects the limits; says which demand how much more.
+        UndeterminedWrenchError: several wrenches are equally good.
+        UnsolvedError: no solver found wrenches that meet the optimality conditions.
+    """
+    problem = _Problem(stance, criterion, limits)
+    f, nu, multipliers, slack = problem.solve()
+    torques = (stance.gravity - stance.jacobian.T @ f)[stance.robot.base_nv :]
+    found = ConstrainedEquilibrium(
+        stance,
+        criterion,
+        f,
+        torques,
+        nu,
+        limits,
+        problem.names,
+        problem.kinds,
+        slack,
+        multipliers,
+    )
+    found.__dict__["_problem"] = problem
+    return found
+
+
+def distance_to_change(
+    stance: Stance, criterion: Criterion, limits: Limits, pressing: Int[np.ndarray, " a"]
+) -> Float[np.ndarray, " r"]:
+    """How far each row is from changing sides if these rows press.
+
+    The slack of a row off its bound, in shares of the weight; the multiplier of one that presses,
+    in shares of the cost's gradient. These rows are the criterion's choice as long as none is
+    negative.
+    """
+    problem = _Problem(stance, criterion, limits)
+    optimum = problem.program.optimum(pressing)
+    distance = (problem.b - problem.A @ optimum.x) / (problem.weight * problem.scale)
+    gradient = max(float(np.abs(problem.H @ optimum.x - problem.g).max()), 1e-300)
+    distance[pressing] = (optimum.multipliers * problem.scale)[pressing] / gradient
+    return distance
+
+
+class _Problem:
+    """The QP of a stance, a criterion and limits."""
+
+    def __init__(self, stance: Stance, criterion: Criterion, limits: Limits) -> None:
+        self.stance, self.criterion = stance, criterion
+        self.nb = nb = stance.robot.base_nv
+        self.Jb, self.Jj = stance.jacobian[:, :nb], stance.jacobian[:, nb:]
+        self.Gb, self.Gj = stance.gravity[:nb], stance.gravity[nb:]
+        self.quadratic: Quadratic = criterion.at(stance)
+        self.W = _torque_weight(self.quadratic, stance)
+        self.H = self.Jj @ self.W @ self.Jj.T + self.quadratic.wrench
+        self.g = self.Jj @ self.W @ self.Gj + self.quadratic.pull
+        rows: LimitRows = limit_rows(stance, limits)
+        self.A, self.b = rows.over_forces(stance)
+        # A contact's row has no joint, and no sign.
+        self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
+        self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
+        # Row of the normal force under a centre of pressure; -1 for any other limit.
+        under = [
+            stance.rows[k].start + stance.contacts[k].components.index(2) if kind == "cop" else -1
+            for k, kind in zip(rows.contacts, rows.kinds, strict=True)
+        ]
+        self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
+        self.names = rows.names + rows.torque_names
+        self.kinds = rows.kinds + ("torque",) * len(rows.joint)
+        self.weight = stance.robot.weight
+        self.program = Program(self.H, self.g, self.Jb, self.Gb, self.A, self.b, self.weight)
+        self.scale = self.program.scale
+        self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
+
+    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Forces, multipliers of the statics and of the rows, slack."""
+        program = self.program
+        curvature = program.curvature
+        if len(curvature) and curvature[0] <= _SINGULAR * curvature[-1]:
+            raise UndeterminedWrenchError(
+                f"criterion {self.criterion.name!r} leaves wrenches undetermined, and limits with "
+                "a tie-break are not supported. Add a small share of another criterion: "
+                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
+            )
+        try:
+            found = program.solve()
+        except NoPointError as error:
+            demands = dict.fromkeys(self.names[i] for i in error.rows)
+            raise InfeasibleError(error.violation, tuple(demands)) from None
+        f, multipliers = found.x, found.multipliers
+        slack = self.b - self.A @ f
+        gradient = max(float(np.abs(self.H @ f - self.g).max()), 1e-300)
+        touching = slack <= _TOUCHING * self.weight * self.scale
+        self.strong = multipliers * self.scale > _PRESSING * gradient
+        self.weak = touching & ~self.strong
+        multipliers[~self.strong] = 0.0
+        slack[self.strong] = 0.0
+        tau = self.Gj - self.Jj.T @ f
+        nu = np.zeros(len(self.Gb) + len(self.Gj))
+        nu[self.nb :] = self.W @ tau
+        np.add.at(
+            nu, self.nb + self.joint[self.joint >= 0], (self.sign * multipliers)[self.joint >= 0]
+        )
+        contact = self.joint < 0
+        left = (
+            self.quadratic.wrench @ f
+            - self.quadratic.pull
+            + self.A[contact].T @ multipliers[contact]
+            - self.Jj @ nu[self.nb :]
+        )
+        nu[: self.nb] = np.linalg.lstsq(self.Jb, left, rcond=None)[0]
+        return f, nu, multipliers, slack
+
+    def differentiate(
+        self, at: ConstrainedEquilibrium, V: Float[np.ndarray, "nv p"], held: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """d f, d tau and d l of the held rows along V, with these rows held."""
+        base, joints, change, bound = self._rates_of_data(at, V)
+        df, _, dl = self.program.hold(held, change, base, bound[held])
+        return df, joints - self.Jj.T @ df, dl
+
+    def _rates_of_data(
+        self, at: ConstrainedEquilibrium, V: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
+
+        The first in two parts, base and joints; the second with the multipliers' part.
+        """
+        AV = self.stance.balance_derivative(at.forces) @ V
+        base, joints = AV[: self.nb], AV[self.nb :]
+        # Stationarity: J nu = W_f (f - f_ref) + A_c' l, nu_j = W tau + s l, here at fixed f and l.
+        change = self.stance.motion_derivative(at.multipliers) @ V + self.Jj @ (self.W @ joints)
+        if self.quadratic.inertia:
+            change += self.Jj @ self._weight_change(at.torques, V)
+        bound = np.zeros((len(self.b), V.shape[1]))
+        torque = self.joint >= 0
+        bound[torque] = -self.sign[torque, None] * joints[self.joint[torque]]
+        return base, joints, change, bound
+
+    def _weight_change(self, torques: np.ndarray, V: np.ndarray) -> np.ndarray:
+        """(dW) tau for W = D + c M^-1: -c M^-1 dM M^-1 tau."""
+        nb = self.nb
+        M = self.stance.mass_matrix[nb:, nb:]
+        inner = np.zeros(nb + len(torques))
+        inner[nb:] = np.linalg.solve(M, torques)
+        moved = self.stance.inertia_derivative(inner)[nb:] @ V
+        return -self.quadratic.inertia * np.linalg.solve(M, moved)
+
+    def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
+        """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
+        strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
+        base, joints, c, bound = (x[:, 0] for x in self._rates_of_data(at, v[:, None]))
+        E, e = np.hstack([self.Jb, self.A[strong].T]), np.concatenate([base, bound[strong]])
+        size = float(np.abs(self.differentiate(at, v[:, None], strong)[0]).max())
+        unit = max(size if np.isfinite(size) else 0.0, float(np.abs(e).max()), 1e-300)
+        try:
+            found = Program(
+                self.H, c, E, e, self.A[weak], bound[weak], unit, _RATES_TOLERANCE
+            ).solve()
+        except (NoPointError, UnsolvedError):
+            raise InvalidInputError(
+                "what is touched or pressed at this very posture leaves no way along this motion "
+                f"that was found ({', '.join(self.names[i] for i in [*strong, *weak])}). The "
+                "limits may become infeasible there, or be degenerate: move a little along the "
+                "path."
+            ) from None
+        df, multipliers = found.x, np.zeros(len(self.b))
+        multipliers[strong], multipliers[weak] = -found.equality[self.nb :], found.multipliers
+        slack = bound - self.A @ df
+        slack[strong] = 0.0
+        slack[multipliers != 0] = 0.0
+        return Rates(df, joints - self.Jj.T @ df, multipliers, slack)
+
+    def optimality(self, at: ConstrainedEquilibrium) -> float:
+        f, l = at.forces, at.row_multipliers
+        gradient = self.H @ f - self.g
+        size = max(float(np.abs(gradient).max()), 1e-9 * self.weight * float(np.abs(self.H).max()))
+        pressing = gradient + self.A.T @ l
+        # What the rows leave of the gradient must be a combination of the balance's rows.
+        left = pressing - self.Jb @ np.linalg.lstsq(self.Jb, pressing, rcond=None)[0]
+        slack = (self.b - self.A @ f) / self.scale
+        parts = [
+            np.abs(left).max() / size,
+            np.abs(self.Jb.T @ f - self.Gb).max() / self.weight,
+            np.max(-slack, initial=0.0) / self.weight,
+            np.max(-l * self.scale, initial=0.0) / size,
+            np.max(np.abs(l * self.scale * slack), initial=0.0) / (size * self.weight),
+        ]
+        return float(max(parts))
+
+
+def _torque_weight(quadratic: Quadratic, stance: Stance) -> Float[np.ndarray, "n n"]:
+    if not quadratic.inertia:
+        return quadratic.torque
+    nb = stance.robot.base_nv
+    M = stance.mass_matrix[nb:, nb:]
+    if np.linalg.cond(M) > 1e12:
+        raise InvalidInputError(
+            "a weight that follows the inertia needs every joint to move some mass when limits are "
+            "on. Give constant weights instead."
+        )
+    return quadratic.torque + quadratic.inertia * np.linalg.inv(M)

@@ -1,0 +1,148 @@
+"""Equilibrium: the wrenches and torques that a criterion chooses, and their derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.arrays import finite_array
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError
+from copsense.stance import Stance
+from copsense.statics.kkt import Kkt
+from copsense.statics.policy import BALANCE, WrenchPolicy, imbalance, policy_forces
+
+UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
+PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
+
+
+@dataclass(frozen=True, eq=False)
+class StaticEquilibrium:
+    """A stance at rest: the contact wrenches and joint torques that hold it.
+
+    Attributes:
+        stance: the stance.
+        criterion: what chose the wrenches; a `Criterion` or a user's law q -> wrenches.
+        forces: stacked contact forces (m,), contact axes [N, Nm].
+        torques: joint torques (n,) [Nm, or N for a prismatic joint].
+        multipliers: nu (nv,), the sensitivity of the cost to the gravity terms; zero for a law.
+    """
+
+    stance: Stance
+    criterion: Criterion | WrenchPolicy
+    forces: Float[np.ndarray, " m"]
+    torques: Float[np.ndarray, " n"]
+    multipliers: Float[np.ndarray, " nv"]
+
+    @property
+    def wrenches(self) -> Float[np.ndarray, "nc 6"]:
+        """Wrench of the environment on the robot at each contact [N, Nm].
+
+        Force, then moment about the contact frame's origin, in contact axes.
+        """
+        return self.stance.unstack(self.forces)
+
+    @property
+    def world_wrenches(self) -> Float[np.ndarray, "nc 6"]:
+        """The same wrenches in world axes, about the same points [N, Nm]."""
+        return self.stance.in_world_axes(self.wrenches)
+
+    @property
+    def unloaded(self) -> tuple[str, ...]:
+        """Names of the contacts without normal force."""
+        return self._where(lambda fz: abs(fz) <= UNLOADED * self.stance.robot.weight)
+
+    @property
+    def pulling(self) -> tuple[str, ...]:
+        """Names of the contacts that would have to pull: the ground cannot."""
+        return self._where(lambda fz: fz < -UNLOADED * self.stance.robot.weight)
+
+    def residual(self) -> float:
+        """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
+        robot = self.stance.robot
+        zero = np.zeros(robot.model.nv)
+        needed = pin.rnea(
+            robot.model,
+            robot.model.createData(),
+            self.stance.q,
+            zero,
+            zero,
+            self.stance.joint_wrenches(self.forces),
+        )
+        needed[robot.base_nv :] -= self.torques
+        return float(np.abs(needed).max())
+
+    def derivative(
+        self, directions: Float[np.ndarray, "nv p"]
+    ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
+        """Derivatives of forces and torques along admissible motions, exact.
+
+        Args:
+            directions: velocities V with J V = 0, as columns.
+
+        Returns:
+            d forces (m, p) and d torques (n, p).
+
+        Raises:
+            InvalidInputError: a direction moves a contact.
+            UndeterminedWrenchError: the rank of the contacts changes at this very posture.
+        """
+        if not isinstance(self.criterion, Criterion):
+            raise InvalidInputError(
+                "a law has no analytic derivative. Use cop_sensitivity, which differentiates it "
+                "numerically."
+            )
+        nv = self.stance.robot.model.nv
+        directions = finite_array(directions, "the directions", (nv, None), "columns with J V = 0")
+        if not is_admissible(self.stance, directions):
+            raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
+        return self._system.derivative(self, directions)
+
+    @cached_property
+    def _system(self) -> Kkt:
+        assert isinstance(self.criterion, Criterion)
+        return Kkt(self.stance, self.criterion)
+
+    def _where(self, test: Callable[[float], bool]) -> tuple[str, ...]:
+        normal = self.wrenches[:, 2]
+        names = self.stance.contact_names
+        return tuple(name for name, fz in zip(names, normal, strict=True) if test(fz))
+
+
+def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticEquilibrium:
+    """The static equilibrium that a criterion chooses ([Romano2016] Eq. (7), (9)).
+
+    Args:
+        stance: robot, configuration and contacts.
+        criterion: a `Criterion`, or a callable q -> wrenches (nc, 6) in contact axes, such as a
+            controller's own.
+
+    Raises:
+        UndeterminedWrenchError: several wrenches are equally good; the message names them.
+        InvalidInputError: weights that do not fit, or a law whose wrenches do not balance gravity.
+    """
+    if not isinstance(criterion, Criterion):
+        forces = policy_forces(stance, criterion)
+        torques = (stance.gravity - stance.jacobian.T @ forces)[stance.robot.base_nv :]
+        return StaticEquilibrium(stance, criterion, forces, torques, np.zeros_like(stance.gravity))
+    system = Kkt(stance, criterion)
+    equilibrium = StaticEquilibrium(stance, criterion, *system.solution)
+    if not imbalance(stance, equilibrium.forces) <= BALANCE * stance.robot.weight:
+        raise InvalidInputError(
+            f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
+            "its weights are too large, too small or too far apart. Bring them nearer to one."
+        )
+    # Kept for the derivatives, which use the same factorisation.
+    equilibrium.__dict__["_system"] = system
+    return equilibrium
+
+
+def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
+    """Whether velocities (nv,) or (nv, p) leave the contacts at rest, within 1e-6."""
+    moved = np.abs(stance.jacobian @ directions).max(initial=0.0)
+    return bool(moved <= 1e-6 * max(1.0, float(np.abs(directions).max(initial=0.0))))

@@ -1,0 +1,98 @@
+"""Law: a user's own q -> wrenches, checked and named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from copsense.arrays import finite_array
+from copsense.errors import CopsenseError, InvalidInputError, UndeterminedWrenchError
+from copsense.stance import Stance
+
+BALANCE = 1e-6  # share of the weight by which wrenches may miss the balance
+
+WrenchPolicy = Callable[[np.ndarray], np.ndarray]
+
+
+def wrench_policy(
+    torques: Callable[[np.ndarray], np.ndarray], stance: Stance, *, name: str | None = None
+) -> WrenchPolicy:
+    """The wrenches that a user's static torques cause, as a law ([Romano2016] Eq. (9)).
+
+    Args:
+        torques: callable q -> joint torques (n,) that hold the robot at rest.
+        stance: gives robot and contacts.
+        name: how the law is called in results; default the callable's own name.
+
+    Raises:
+        UndeterminedWrenchError: no torque can feel some wrenches (redundant contacts).
+    """
+
+    def law(q: np.ndarray) -> np.ndarray:
+        here = stance.at(q)
+        if here.rank < len(here.component_index):
+            raise UndeterminedWrenchError(
+                "torques do not determine the wrenches here: no torque can feel "
+                f"{', '.join(here.redundant_directions)}. Give a law of wrenches instead.",
+                here.redundant_directions,
+            )
+        balance = here.gravity.copy()
+        balance[here.robot.base_nv :] -= finite_array(
+            torques(q), "the torques returned", (len(here.robot.torque_names),), "one per joint"
+        )
+        # J' f = G - B tau: consistent where the torques hold the robot, so any inverse serves.
+        return here.unstack(np.linalg.lstsq(here.jacobian.T, balance, rcond=None)[0])
+
+    law.__name__ = name or policy_name(torques)
+    return law
+
+
+def policy_name(law: object) -> str:
+    """How a law is called in results: the name of its function, or of its class.
+
+    Raises:
+        InvalidInputError: it is no law, for it cannot be called.
+    """
+    if not callable(law):
+        raise InvalidInputError(
+            f"{law!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, such "
+            "as criterion_named('minimum-torque')."
+        )
+    return str(getattr(law, "__name__", type(law).__name__))
+
+
+def policy_forces(stance: Stance, law: WrenchPolicy) -> np.ndarray:
+    """Stacked forces (m,) of a law at a stance, refused if they do not balance gravity."""
+    what, nc, m = f"the law {policy_name(law)!r}", len(stance.contacts), len(stance.component_index)
+    try:
+        returned = law(stance.q)
+    except CopsenseError:
+        raise
+    except Exception as error:
+        raise InvalidInputError(
+            f"{what} raised {type(error).__name__}: {error}. Mend it at this posture, or keep the "
+            "posture out."
+        ) from error
+    stacked = isinstance(returned, np.ndarray) and returned.ndim == 1
+    wrenches = finite_array(
+        returned,
+        f"what {what} returned",
+        (m,) if stacked else (nc, 6),
+        "stacked forces" if stacked else "wrenches in contact axes, force first",
+    )
+    if not stacked:
+        wrenches = stance.stack(wrenches)
+    missing = imbalance(stance, wrenches)
+    if missing > BALANCE * stance.robot.weight:
+        raise InvalidInputError(
+            f"the wrenches of {what} do not balance gravity: {missing:.3g} N or Nm remain on "
+            "the base. Give what the ground does to the robot, contact axes, force first."
+        )
+    return wrenches
+
+
+def imbalance(stance: Stance, forces: np.ndarray) -> float:
+    """Largest force or moment on the base that contact forces leave unbalanced [N, Nm]."""
+    nb = stance.robot.base_nv
+    return float(np.abs(stance.jacobian[:, :nb].T @ forces - stance.gravity[:nb]).max())

@@ -1,0 +1,188 @@
+"""``copsense benchmark`` answers, writes, goes on and refuses."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from support.commands import copsense
+
+from copsense.comparison import load_benchmark, read_plan
+from copsense.comparison.trials import Breaking, Falls
+from copsense.plots import plot_benchmark, render_figure
+
+PLAN = """
+[robots.narrow]
+source = "icub"
+soles = { l_sole = [-0.05, 0.1, -0.01, 0.03], r_sole = [-0.05, 0.1, -0.03, 0.01] }
+[postures.straight]
+knees = 0
+[controllers.one]
+criterion = "minimum-wrench"
+[controllers.wide]
+criterion = "minimum-torque"
+limits = { friction = 0.9, torsion = false }
+[conditions.slow]
+motors = { delay = 0.002 }
+pushes = [{ force = [0.0, 0.1, 0.0], start = 0.1 }]
+[trials.lean]
+reach = 0.015
+speed = 0.02
+[trials."two falls"]
+kind = "falls"
+repeats = 2
+[trials.delay]
+severe = 0.04
+[[block]]
+trials = "lean"
+controllers = ["one"]
+[[block]]
+trials = ["two falls"]
+controllers = "wide"
+"""
+
+
+@pytest.fixture
+def plan(tmp_path):
+    path = tmp_path / "plan.toml"
+    path.write_text(PLAN)
+    return path
+
+
+def test_a_plan_is_read(plan):
+    lean, falls = read_plan(plan)
+    assert lean.label == ("narrow", "straight", "one", "slow", "lean")
+    assert lean.conditions.values["motors"].delay == 0.002
+    assert lean.conditions.values["pushes"][0].force == (0.0, 0.1, 0.0)
+    assert lean.trial.speed == 0.02
+    assert falls.trial == Falls(repeats=2)
+    assert falls.controller.limits.torsion is None
+    assert falls.controller.limits.friction == 0.9
+    plan.write_text(PLAN.partition("[[block]]")[0].replace('[trials."two falls"]', "[trials.falls]")
+                    .replace('kind = "falls"\n', ""))  # fmt: skip
+    with pytest.raises(Exception, match="without limits"):
+        read_plan(plan)  # the product has falls of the controller without
+    plan.write_text(PLAN.replace('trials = "lean"', 'trials = "delay"'))
+    assert read_plan(plan)[0].trial == Breaking("delay", severe=0.04)
+
+
+def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):
+    plan.write_text(PLAN.rpartition("[[block]]")[0])
+    table, picture = tmp_path / "table.csv", tmp_path / "table.png"
+    answer = copsense("benchmark", "--plan", plan, "--output", table, "--plot", picture)
+    assert answer.code == 0, answer.err
+    assert "tip excursion [mm]" in answer.out
+    assert "statics" in answer.out
+    assert "ranking over 1 case" in answer.out
+    assert "holds the theory against physics" in answer.out
+    assert picture.stat().st_size > 10_000
+    assert len(load_benchmark(table)) == 1
+    again = copsense("benchmark", "--plan", plan, "--output", table, "--plot", picture, "--json")
+    assert "1 of 1 cases are in" in again.err
+    found = again.json
+    assert found["cases"] == 1
+    assert found["failed"] == 0
+    assert found["scores"][0]["contact"] == "r_sole"
+    assert found["agreement"][0]["cases"] == 1
+    assert "share the law" in found["caveat"]
+
+
+def test_a_failed_run_makes_the_exit_code_one(tmp_path):
+    answer = copsense("benchmark", "icub", "--posture", "width=3", "--disturbance", "rest",
+                      "--criterion", "minimum-torque", "--jobs", 1)  # fmt: skip
+    assert answer.code == 1
+    assert "failed: icub / width=3 / minimum-torque / rest:" in answer.err
+
+
+def test_a_picture_shows_bounds_failures_and_predictions():
+    rows = [
+        {
+            "key": f"{c}{p}{s}", "robot": "r", "posture": p, "controller": c, "conditions": "ideal",
+            "trial": "lean", "score": s, "unit": "m", "status": status, "value": value,
+            "low": low, "high": high, "predicted": predicted, "first_order": np.nan,
+            "parameters": "",
+        }
+        for c in ("minimum-wrench", "mine")
+        for p, status, value, low, high, predicted in (
+            ("a", "measured", 0.03, 0.029, 0.031, 0.03),
+            ("b", "bound", np.nan, 0.07, np.inf, np.nan),
+            ("c", "failed", np.nan, np.nan, np.nan, np.nan),
+        )
+        for s in ("tip_excursion", "smallest_margin")
+    ]  # fmt: skip
+    figure = plot_benchmark(pd.DataFrame(rows))
+    assert len(figure.axes) == 4
+    assert "share the law" in figure.legends[0].get_title().get_text()
+    said = [text.get_text() for ax in figure.axes for text in ax.texts]
+    assert " ≥ 70" in said
+    assert " × failed" in said
+    assert any("2 cases, mean error 0" in text for text in said)
+    assert render_figure(figure, ".png")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["icubb"], "icub"),
+        (["icub", "--criterion", "best"], "best"),
+        (["icub", "--posture", "sitting"], "own, straight, knees=RAD"),
+        (["icub", "--posture", "knees=a"], "knees=RAD"),
+        (["solo12", "--posture", "straight"], "joints in a plan file"),
+        (["icub", "--disturbance", "dance"], "dance"),
+        (["icub", "--disturbance", "lean:speed"], "TRIAL[:OPTION=VALUE"),
+        (["icub", "--disturbance", "lean:depth=3"], "depth"),
+        (["icub", "--disturbance", "lean:side=up"], "up"),
+        (["icub", "--disturbance", "lean:kind=3"], "no option of the trial 'lean' named 'kind'"),
+        (["icub", "--disturbance", "lean:scores=3"], "Valid: reach, speed, side."),
+        (["icub", "--disturbance", "lean:side=3"], "Give a text"),
+        (["icub", "--disturbance", "delay:parameter=bandwidth"], "named 'parameter'"),
+        (["icub", "--disturbance", "delay:step=1e-300"], "finer than any simulation"),
+        (["icub", "--contact", "no_sole"], "no_sole"),
+        (["icub", "--disturbance", "falls"], "--limits"),
+        (["icub", "--limits", "wind=3"], "wind"),
+        (["icub", "--repeats", "3"], "falls"),
+        (["icub", "--output", "table.txt"], "suffix"),
+        (["icub", "--plot", "table.txt"], "suffix"),
+        (["icub", "--plan", "plan.toml"], "leave icub out"),
+        (["--quick", "--plan", "plan.toml"], "leave --quick out"),
+        (["--plan", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_bad_options_are_one_clear_line(options, says):
+    assert says in copsense("benchmark", *options).error
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("[robots.narrow]", "[robot.narrow]"), "robots"),
+        (("[robots.narrow]", "[robots.narrow"), "no TOML"),
+        (("knees = 0", 'knees = "bent"'), "postures.straight"),
+        (("knees = 0", "knee = 0"), "knees"),
+        (("reach = 0.015", "reach = -1"), "reach"),
+        (('kind = "falls"', 'kind = "tumbles"'), "tumbles"),
+        (("motors = {", "engines = {"), "engines"),
+        (("delay = 0.002", "lag = 0.002"), "lag"),
+        (("friction = 0.9", "friction = -1"), "friction"),
+        (('controllers = ["one"]', 'controllers = ["two"]'), "two"),
+        (('trials = "lean"', 'moves = "lean"'), "moves"),
+        (("[-0.05, 0.1, -0.01, 0.03]", "[0.1, -0.05, -0.01, 0.03]"), "x0 < x1"),
+        (("reach = 0.015", "scores = 3"), "named 'scores'"),
+        (("reach = 0.015", 'reach = "far"'), "reach is 'far'. Give a number"),
+        (("knees = 0", 'name = "x"'), "Leave it out"),
+        (("knees = 0", "joints_deg = 3"), "joints is 3. Give a table, each a number"),
+        (("l_sole = [-0.05, 0.1, -0.01, 0.03]", "l_sole = 3"), "soles"),
+        (("soles = {", "contacts = 'l_sole' #"), "contacts is 'l_sole'. Give a list"),
+        (('source = "icub"', "source = 3"), "source is 3. Give a text"),
+        (('source = "icub"', 'source = "icup"'), "icup"),
+        (('criterion = "minimum-wrench"', "source = 3"), "source is 3. Give a text"),
+        (("limits = { friction = 0.9, torsion = false }", "limits = 3"), "limits is 3"),
+        (("motors = { delay = 0.002 }", "motors = 3"), "motors is 3"),
+        (("motors = { delay = 0.002 }", 'seed = "x"'), "seed is 'x'. Give a whole number"),
+        (('[[block]]\ntrials = "lean"', "[[block]]\ntrials = []"), "has no trials"),
+        (("[trials.lean]", "[trials]\nlean = 3\n[trials.lean2]"), "trials.lean"),
+    ],
+)
+def test_bad_plans_are_one_clear_line(plan, change, says):
+    text = plan.read_text()
+    assert change[0] in text
+    plan.write_text(text.replace(*change))
+    assert says in copsense("benchmark", "--plan", plan).error

@@ -1,0 +1,1 @@
+"""What several tests share: robots, stances, other engines, and problems written apart."""

@@ -1,0 +1,67 @@
+"""Robots and postures for the tests of the batch."""
+
+import numpy as np
+
+import copsense
+from support.grounds import off_centre, on_tilted_planes, with_hand
+
+WRENCH, TORQUE = copsense.minimum_wrench(0.7), copsense.minimum_torque()
+
+
+def served(stance):
+    """Criteria that the kernel answers itself."""
+    n = len(stance.robot.torque_names)
+    weights = copsense.weighted_torque(np.linspace(0.5, 3.0, n))
+    return [WRENCH, TORQUE, weights, copsense.mixed((WRENCH, 0.3), (TORQUE, 1.0))]
+
+
+def postures(stance, count, *, seed=0, size=0.2):
+    """Random postures on the contacts, as configurations (count, nq)."""
+    rng = np.random.default_rng(seed)
+    Z, found = stance.admissible_motions, []
+    while len(found) < count:
+        try:
+            moved = copsense.retract(stance, Z @ (size * rng.standard_normal(Z.shape[1])))
+            found.append(stance.at(moved.q).q)
+        except copsense.CopsenseError:
+            continue
+    return np.array(found)
+
+
+def both_feet_and_hands(icub):
+    """Four contacts: two soles and both hands, one on a wall and one on a table."""
+    stance = with_hand(off_centre(icub), "l_hand", (-1, 0.2, 0.1))
+    hand = stance.with_contacts([copsense.Contact("r_hand")]).placements[0].translation
+    table = copsense.Plane(tuple(float(c) for c in hand), (0.1, 0.0, 1.0))
+    right = copsense.Contact("r_hand", kind="point", name="right hand", plane=table)
+    return stance.with_contacts([*stance.contacts, right])
+
+
+def hand_flat(icub):
+    """Three surfaces: two soles and a hand laid flat on a table."""
+    stance = off_centre(icub)
+    place = stance.with_contacts([copsense.Contact("l_hand")]).placements[0]
+    turn = np.array(place.rotation.T)
+    palm = copsense.Contact(
+        "l_hand",
+        rotation=turn,
+        name="palm",
+        polygon=np.array([[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]]),
+    )
+    return stance.with_contacts([*stance.contacts, palm])
+
+
+CASES = {
+    "icub": lambda load: load("icub"),
+    "icub, hand on a wall": lambda load: with_hand(
+        off_centre(load("icub")), "l_hand", (-1, 0.2, 0.1)
+    ),
+    "icub, both hands": lambda load: both_feet_and_hands(load("icub")),
+    "icub, three surfaces": lambda load: hand_flat(load("icub")),
+    "talos on slopes": lambda load: on_tilted_planes(load("talos"), tilt=0.15, step=0.03, seed=2),
+    "g1": lambda load: load("g1"),
+    "human": lambda load: load("human"),
+    "solo12 on slopes": lambda load: on_tilted_planes(load("solo12"), tilt=0.3, step=0.05),
+    "anymal_c": lambda load: load("anymal_c"),
+    "solo12 on three feet": lambda load: load("solo12").with_contacts(load("solo12").contacts[1:]),
+}
