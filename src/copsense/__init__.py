@@ -39,7 +39,6 @@ from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summar
 from copsense.margins import limit_margins, limit_travel
 from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
-from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robot import Robot
 from copsense.robots import (
@@ -65,8 +64,7 @@ from copsense.statics import (
     solve_equilibrium,
     wrench_policy,
 )
-from copsense.storage import load_results, write_results
-from copsense.sweeps import failed_rows, sweep
+from copsense.sweeps import Sweep, sweep
 
 __all__ = [
     "CRITERIA",
@@ -92,6 +90,7 @@ __all__ = [
     "Sole",
     "Stance",
     "StaticEquilibrium",
+    "Sweep",
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
@@ -105,7 +104,6 @@ __all__ = [
     "criterion_region",
     "design_criterion",
     "edge_margin",
-    "failed_rows",
     "families",
     "finite_difference_sensitivity",
     "foot_rotation_indicator",
@@ -116,7 +114,6 @@ __all__ = [
     "limit_margins",
     "limit_travel",
     "load_map",
-    "load_results",
     "load_robot",
     "load_stance",
     "map_postures",
@@ -138,8 +135,6 @@ __all__ = [
     "sweep",
     "total_center_of_pressure",
     "weighted_torque",
-    "with_limit_margins",
     "wrench_policy",
-    "write_results",
     "zero_moment_point",
 ]

@@ -79,10 +79,10 @@ def analyse(
     ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. Lengths in the answer
     are along the contact's axes: x forward, y left, z the normal.
     """
+    from copsense.files import check_output
     from copsense.posture import solve_posture
     from copsense.robots import sole_notes
     from copsense.sensitivity import check_sensitivity, cop_sensitivity
-    from copsense.storage import check_output
 
     for drawn in filter(None, (picture, regions)):
         check_output(drawn, suffixes=(".png", ".svg", ".pdf"), overwrite=force)

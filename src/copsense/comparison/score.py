@@ -9,14 +9,13 @@ from functools import singledispatch
 from typing import Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from copsense.comparison.bench import Bench
 from copsense.comparison.intervals import Bracket, bisect, wilson_interval
 from copsense.comparison.prediction import predict_impulse
 from copsense.comparison.trials import SCORES, Breaking, Falls, Lean, PushToTip, Rest, Sway
 from copsense.controllers import Hold, Sine
-from copsense.simulation import Motors, Noise, Push
+from copsense.simulation import Motors, Noise, Push, Recording
 from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push
@@ -158,7 +157,7 @@ def _push(trial: PushToTip, bench: Bench) -> list[Score]:
     expected, note = bench.statics(lean)
     reference = bench.reference(Hold())
     largest = trial.largest or _FASTEST * bench.stance.robot.mass
-    tips: dict[float, xr.Dataset] = {}
+    tips: dict[float, Recording] = {}
 
     def survives(impulse: float) -> bool:
         force = (0.0, sign * impulse / trial.duration, 0.0)

@@ -36,7 +36,7 @@ from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
 from copsense.paper.lateral import LateralSweep, Series
 from copsense.paper.linkage import Hand
 from copsense.paper.printed import PRINTED_FORMS, PrintedForm
-from copsense.paper.sway import Stretch, Sway, completed, stretch, tip_travel, tracking_error
+from copsense.paper.sway import Stretch, Sway, stretch
 from copsense.paper.sway_claims import SWAY_CLAIMS, evaluate_sway_claims
 
 __all__ = [
@@ -69,7 +69,6 @@ __all__ = [
     "Sway",
     "Verdict",
     "compare_with_reference",
-    "completed",
     "evaluate_claims",
     "evaluate_errata",
     "evaluate_four_bar_claims",
@@ -83,6 +82,4 @@ __all__ = [
     "solve_four_bar",
     "solve_four_bar_member",
     "stretch",
-    "tip_travel",
-    "tracking_error",
 ]

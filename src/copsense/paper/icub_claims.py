@@ -6,8 +6,6 @@ the foot on whose side the CoM is.
 
 from __future__ import annotations
 
-import xarray as xr
-
 from copsense.paper.claim import CheckedClaim, Claim, EvaluatedClaim, evaluate_claims
 from copsense.paper.four_bar import FourBar
 from copsense.paper.icub_checks_cops import (
@@ -30,6 +28,7 @@ from copsense.paper.icub_checks_forces import (
     tends_to_zero,
 )
 from copsense.paper.lateral import LateralSweep
+from copsense.sweeps import Sweep
 
 ICUB_CLAIMS: tuple[CheckedClaim[LateralSweep], ...] = (
     CheckedClaim(
@@ -151,7 +150,7 @@ ICUB_CLAIMS: tuple[CheckedClaim[LateralSweep], ...] = (
 )
 
 
-def evaluate_icub_claims(dataset: xr.Dataset, four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
+def evaluate_icub_claims(dataset: Sweep, four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
     """Evaluate the paper's claims about the iCub on a lateral sweep.
 
     Args:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from copsense.binding import next_change
 from copsense.limits import Limits
 from copsense.path import PosturePath
-from copsense.recorded import with_limit_margins
 from copsense.regions import com_region, criterion_region
 from copsense.reproduction.clock import Clock
 from copsense.reproduction.lateral import paper_criteria
@@ -22,7 +21,7 @@ def solve_within_limits(
     """The lateral sweep within limits, where they first bind, and the regions that they leave."""
     criteria = paper_criteria()
     with clock.stage("limits: sensitivities", len(path)) as advance:
-        dataset = with_limit_margins(sweep(path, criteria, limits, progress=advance), limits)
+        dataset = sweep(path, criteria, limits, progress=advance)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
         bindings = []
         for criterion in criteria:

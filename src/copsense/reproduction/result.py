@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.binding import LimitChange
@@ -22,6 +21,7 @@ from copsense.paper import (
     Sway,
 )
 from copsense.regions import ComRegion
+from copsense.sweeps import Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class WithinLimits:
     """
 
     limits: Limits
-    lateral: xr.Dataset
+    lateral: Sweep
     bindings: tuple[LimitChange, ...]
     regions: Mapping[str, ComRegion]
 
@@ -93,8 +93,8 @@ class Reproduction:
 
     four_bar: FourBar
     four_bar_figures: tuple[FigureData, ...]
-    lateral: xr.Dataset
-    lateral_at_sole: xr.Dataset
+    lateral: Sweep
+    lateral_at_sole: Sweep
     unit_of_length: UnitOfLength
     within_limits: WithinLimits
     sway: Sway | None

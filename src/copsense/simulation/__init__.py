@@ -1,9 +1,10 @@
 """Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
 
+from copsense.simulation.closed_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
 from copsense.simulation.engine import MujocoSimulator
 from copsense.simulation.odometry import FootOdometry
-from copsense.simulation.rollout import rollout
+from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.simulation.settings import PhysicsSettings
 from copsense.simulation.simulator import (
@@ -25,6 +26,7 @@ __all__ = [
     "Noise",
     "PhysicsSettings",
     "Push",
+    "Recording",
     "Scenario",
     "Simulator",
     "SimulatorStoppedError",
