@@ -2,18 +2,18 @@
 
 from copsense.simulation.closed_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
-from copsense.simulation.engine import MujocoSimulator
+from copsense.simulation.events import Event, Thresholds
+from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.odometry import FootOdometry
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
-from copsense.simulation.settings import PhysicsSettings
 from copsense.simulation.simulator import (
     AlterableSimulator,
     Simulator,
     SimulatorStoppedError,
     Snapshot,
 )
-from copsense.simulation.watch import Event, Thresholds
 
 __all__ = [
     "AlterableSimulator",

@@ -19,6 +19,7 @@ from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.provenance import made_by
 from copsense.simulation.actuation import Actuation
+from copsense.simulation.events import Event, EventDetector, Thresholds
 from copsense.simulation.odometry import FootOdometry
 from copsense.simulation.recorder import Recorder
 from copsense.simulation.recording import Recording
@@ -29,7 +30,6 @@ from copsense.simulation.simulator import (
     SimulatorStoppedError,
     Snapshot,
 )
-from copsense.simulation.watch import Event, Thresholds, Watch
 from copsense.stance import Stance
 
 _PLACE = 1e-5  # m, rad: contacts nearer than this are at one place
@@ -120,7 +120,7 @@ def _run(
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
     sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance, dt)
-    watch, recorder = Watch(stance, thresholds), Recorder(stance)
+    watch, recorder = EventDetector(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
     if count < 1:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from copsense.labelled import LabelledResult, tidy_table
-from copsense.simulation.watch import Event
+from copsense.simulation.events import Event
 
 if TYPE_CHECKING:
     import pandas as pd

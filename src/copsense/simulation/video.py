@@ -17,7 +17,7 @@ import pinocchio as pin
 
 from copsense.errors import InvalidInputError, MissingExtraError, OutputError
 from copsense.files import check_output, write_beside
-from copsense.simulation.engine import load_mujoco
+from copsense.simulation.mujoco_simulator import load_mujoco
 from copsense.simulation.recording import Recording
 from copsense.stance import Stance
 
