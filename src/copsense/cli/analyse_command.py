@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.limits import (
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.limit_text import (
     add_limits,
     add_regions,
     limit_verdict,
@@ -16,15 +18,9 @@ from copsense.cli.limits import (
     print_limits,
     print_regions,
 )
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    read_assignments,
-    read_criteria,
-    read_limits,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.printing import echo_json
+from copsense.cli.quantities import read_positions
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -95,8 +91,8 @@ def analyse(
             "--limits friction=0.33,torque=model."
         )
     chosen = read_criteria(criteria, characteristic_length)
-    held = {joint: math.radians(deg) for joint, deg in read_assignments(joints).items()}
     home = read_stance(robot, **options)
+    held = read_positions(joints, home.robot)
     if along is not None:
         home.robot.velocity_index(along)
     planar = home.robot.base_nv != 6
@@ -117,8 +113,13 @@ def analyse(
     answer.setdefault("notes", []).extend(sole_notes(stance))
     answer["notes"] += [
         f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
-        for joint, excess in zip(
-            stance.robot.torque_names, stance.joint_limit_excess.tolist(), strict=True
+        if unit == "rad"
+        else f"{joint} is {excess * 1e3:.1f} mm beyond its limit."
+        for joint, unit, excess in zip(
+            stance.robot.torque_names,
+            stance.robot.torque_units,
+            stance.joint_limit_excess.tolist(),
+            strict=True,
         )
         if excess > 1e-6
     ]

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    progress_bar,
-    read_criteria,
-    read_limits,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, progress_bar
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
