@@ -47,10 +47,14 @@ def test_a_range_takes_units_at_both_ends():
 
 @pytest.fixture(scope="module")
 def elevator(tmp_path_factory):
-    """A lift on a wide foot: a prismatic joint, and a revolute one over it."""
+    """A cabin that slides over a wide foot, and an arm on it that turns."""
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    link = '<link name="{}"><inertial><mass value="5"/>' + inertia + "</inertial></link>"
-    text = '<robot name="elevator">' + "".join(map(link.format, ("base", "cabin", "arm")))
+    text = '<robot name="elevator">'
+    for name, height in (("base", 0), ("cabin", 0), ("arm", 0.4)):
+        text += (
+            f'<link name="{name}"><inertial><origin xyz="0 0 {height}"/><mass value="5"/>{inertia}'
+            "</inertial></link>"
+        )
     for name, kind, axis, parent, child in (
         ("slide", "prismatic", "0 1 0", "base", "cabin"),
         ("turn", "revolute", "1 0 0", "cabin", "arm"),
@@ -58,7 +62,7 @@ def elevator(tmp_path_factory):
         text += (
             f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
             f'<origin xyz="0 0 0.5"/><axis xyz="{axis}"/>'
-            '<limit lower="-0.25" upper="0.25" effort="100" velocity="1"/></joint>'
+            '<limit lower="-0.05" upper="0.05" effort="100" velocity="1"/></joint>'
         )
     path = tmp_path_factory.mktemp("robots") / "elevator.urdf"
     path.write_text(text + "</robot>")
@@ -94,30 +98,32 @@ def test_joints_of_several_coordinates_have_a_unit_for_each():
 
 
 def test_a_sweep_of_a_prismatic_joint_is_in_metres(elevator):
-    answer = copsense("sweep", elevator, *STAND, "--joint", "slide=0:0.2:3", "--json")
-    assert answer.code == 0, answer.err
-    assert answer.json["unit"] == "m"
-    assert answer.json["criteria"]["minimum-torque"]["planted"] == [0.0, 0.2]
-    mm = copsense("sweep", elevator, *STAND, "--joint", "slide=0mm:200mm:3", "--json")
-    assert mm.json["criteria"] == answer.json["criteria"]
-    assert (
-        "from +0 to +0.2 m" in copsense("sweep", elevator, *STAND, "--joint", "slide=0:0.2:3").out
+    metres = copsense("sweep", elevator, *STAND, "--joint", "slide=0:0.15:4", "--json")
+    assert metres.code == 0, metres.err
+    assert metres.json["unit"] == "m"
+    assert metres.json["criteria"]["minimum-torque"]["planted"] == [0.0, 0.15]
+    assert "slide is beyond its limit at 2 postures, by up to 100.0 mm" in metres.err
+    text = copsense("sweep", elevator, *STAND, "--joint", "slide=0mm:150mm:4").out
+    assert "from +0 to +0.15 m" in text
+
+
+def test_a_posture_holds_a_prismatic_joint_in_metres(elevator):
+    held = [
+        copsense("analyse", elevator, *STAND, "--joint", f"slide={value}", "--json")
+        for value in ("0.1", "100mm")
+    ]
+    assert held[0].json == held[1].json
+    assert "slide is 50.0 mm beyond its limit." in held[0].json["notes"]
+    near, middle = (
+        copsense("analyse", elevator, *STAND, "--posture", f"slide={value}", "--json").json
+        for value in ("0.1", "0")
     )
+    assert near["com"][2] < middle["com"][2] - 1e-6  # bent, to stay near what was asked for
 
 
-def test_posture_and_joint_hold_a_prismatic_joint_in_metres(elevator):
-    far = copsense("analyse", elevator, *STAND, "--posture", "slide=0.1", "--com-y=0.05", "--json")
-    near = copsense("analyse", elevator, *STAND, "--joint", "slide=100mm", "--com-y=0.05", "--json")
-    for answer in (far, near):
-        assert answer.code == 0, answer.err
-    same = copsense("analyse", elevator, *STAND, "--joint", "slide=0.1", "--com-y=0.05", "--json")
-    assert near.json == same.json
-
-
-def test_excess_and_slopes_are_said_in_the_joint_s_unit(elevator):
-    answer = copsense("analyse", elevator, *STAND, "--posture", "slide=0.3", "--along", "slide")
-    assert "slide is 50.0 mm beyond its limit" in answer.err
-    assert "dCoP_y/dslide [mm/mm]" in answer.out
-    assert "[mm/deg]" in copsense("analyse", elevator, *STAND, "--along", "turn").out
-    swept = copsense("sweep", elevator, *STAND, "--joint", "slide=0:0.3:4")
-    assert "slide is beyond its limit at 1 postures, by up to 50.0 mm" in swept.err
+def test_slopes_are_per_degree_or_per_metre_of_the_joint(elevator):
+    slide, turn = (
+        copsense("analyse", elevator, *STAND, "--along", joint).out for joint in ("slide", "turn")
+    )
+    assert "dCoP_y/dslide [mm/mm]" in slide
+    assert "dCoP_y/dturn [mm/deg]" in turn

@@ -132,7 +132,7 @@ def analyse(
     if as_json:
         echo_json(answer)
     else:
-        _print(answer, along)
+        _print(answer, along, home.robot.joint_unit(along) if along else "rad")
 
 
 def _answer(
@@ -186,7 +186,8 @@ def _answer(
     }
 
 
-def _print(answer: dict[str, Any], along: str | None) -> None:
+def _print(answer: dict[str, Any], along: str | None, unit: str) -> None:
+    per, scale = ("mm/mm", 1.0) if unit == "m" else ("mm/deg", 1e3 * math.pi / 180)
     com = ", ".join(f"{round(value, 4) + 0.0:+.4f}" for value in answer["com"])
     click.echo(f"{answer['robot']}: {answer['mass']:.2f} kg, CoM ({com}) m, world axes")
     click.echo(
@@ -199,7 +200,7 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
         )
         head = f"  {'contact':{width}}   load  CoP x, y [mm]     margin [mm]          "
         head += "dCoP_y/dCoM_y  worst gain  CoM travel [mm]: tips  unloads"
-        click.echo(head + (f"  dCoP_y/d{along} [mm/deg]" if along else ""))
+        click.echo(head + (f"  dCoP_y/d{along} [{per}]" if along else ""))
         clipped = presses(row)
         for contact, c in row["contacts"].items():
             margin = "-"
@@ -220,7 +221,7 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
                 f"  {c['worst_case_gain']:10.3f}  {tips:>21}  {unloads:>7}"
             )
             if along:
-                line += f"  {c[f'cop_per_{along}'][1] * 1e3 * math.pi / 180:12.3f}"
+                line += f"  {c[f'cop_per_{along}'][1] * scale:12.3f}"
             click.echo(line + ("  PULLING" if c["pulling"] else ""))
         if "limit_travel" in row:
             click.echo(

@@ -39,9 +39,8 @@ def reproduce(
     self-contained HTML report written. The last line printed is its path. Limits are those of the
     report's section on them; by default, what public configurations for this robot use.
     """
-    from copsense.report import check_report_folder, write_report
-    from copsense.reproduction import LIMITS, SWAY_FREQUENCY
-    from copsense.reproduction import reproduce as compute
+    from copsense.paper.report import check_report_folder, write_report
+    from copsense.paper.reproduce import LIMITS, SWAY_FREQUENCY, reproduce_paper
 
     check_report_folder(output, overwrite=force)
     within = read_limits(limits) or LIMITS
@@ -68,7 +67,7 @@ def reproduce(
                 bar.set_description_str(stage, refresh=False)
             bar.update(done - bar.n)
 
-        result = compute(
+        result = reproduce_paper(
             postures=postures,
             limits=within,
             sway_frequency=None if static else SWAY_FREQUENCY,

@@ -99,8 +99,8 @@ def sweep(
         echo_json(summary)
     else:
         _print(summary)
-    robot = path.stances[0].robot
-    units = dict(zip(robot.torque_names, robot.torque_units, strict=True))
+    model = path.stances[0].robot
+    units = dict(zip(model.torque_names, model.torque_units, strict=True))
     beyond = dataset["joint_limit_excess"].max("posture")
     for name in beyond["joint"].values[beyond.values > _OVER_LIMIT]:
         count = int((dataset["joint_limit_excess"].sel(joint=name) > _OVER_LIMIT).sum())
