@@ -17,9 +17,9 @@ from copsense.cli.analyse import analyse
 from copsense.cli.balance import balance
 from copsense.cli.benchmark import benchmark
 from copsense.cli.design import design
-from copsense.cli.four_bar import four_bar
+from copsense.cli.four_bar_command import four_bar
 from copsense.cli.map import map_command
-from copsense.cli.reproduce import reproduce
+from copsense.cli.reproduce_command import reproduce
 from copsense.cli.robots import robots
 from copsense.cli.sweep import plot, sweep
 from copsense.errors import CopsenseError
