@@ -36,7 +36,7 @@ PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 _NO_POSITION = 1e30  # rad, or m
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A floating-base robot at no particular posture.
 
@@ -309,20 +309,30 @@ class Robot:
         Raises:
             InvalidInputError: wrong shape, NaN or infinity, or an unnormalised quaternion.
         """
-        meaning = (
-            f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
-            if self.base_nv == 6
-            else f"base position, cosine and sine, then {len(self.joint_names)} joints"
-        )
-        array = finite_array(
-            q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
-        )
+        if isinstance(q, np.ndarray) and q.shape == (self.model.nq,) and q.dtype == float:
+            array = q if np.isfinite(q).all() else self._configuration(q)
+        else:
+            array = self._configuration(q)
         if not pin.isNormalized(self.model, array, 1e-6):
             raise InvalidInputError(
                 "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
                 "length. Give it in the order x, y, z, w; pin.normalize(model, q) fixes rounding."
             )
         return read_only(pin.normalize(self.model, array))
+
+    def _configuration(self, q: object) -> Float[np.ndarray, " nq"]:
+        meaning = (
+            f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
+            if self.base_nv == 6
+            else f"base position, cosine and sine, then {len(self.joint_names)} joints"
+        )
+        return finite_array(
+            q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
+        )
+
+    def __repr__(self) -> str:
+        """Name, joints and mass."""
+        return f"Robot({self.name!r}, {len(self.torque_names)} joints, {self.mass:.4g} kg)"
 
 
 def build_model(description: Description) -> pin.Model:
