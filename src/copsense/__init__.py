@@ -10,11 +10,9 @@ from copsense._version import __version__
 from copsense.binding import LimitChange, next_change
 from copsense.contact import Contact, Plane, rectangle
 from copsense.cop import (
-    EdgeMargin,
     center_of_pressure,
     com_projection,
     contact_cops,
-    edge_margin,
     foot_rotation_indicator,
     total_center_of_pressure,
     zero_moment_point,
@@ -38,6 +36,7 @@ from copsense.limits import Limits
 from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
 from copsense.margins import limit_margins, limit_travel
 from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
+from copsense.polygon import EdgeMargin, Polygon
 from copsense.posture import Posture, PostureCost, retract, solve_posture
 from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
@@ -84,6 +83,7 @@ __all__ = [
     "LimitChange",
     "Limits",
     "Plane",
+    "Polygon",
     "Posture",
     "PostureCost",
     "PosturePath",
@@ -104,7 +104,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "edge_margin",
     "failed_rows",
     "families",
     "finite_difference_sensitivity",

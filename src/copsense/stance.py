@@ -12,7 +12,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.contact import COMPONENT_NAMES, Contact
+from copsense.contact import COMPONENT_NAMES, Contact, Plane
 from copsense.errors import ContactGeometryError, InsufficientContactsError, InvalidInputError
 from copsense.robot import Robot
 
@@ -105,10 +105,10 @@ class Stance:
         """World placement of each contact frame."""
         found = []
         for contact in self.contacts:
-            joint, placement = _attachment(self.robot, contact)
+            joint, placement = contact.on(self.robot)
             world = self._data.oMi[joint] * placement
             if contact.kind == "point":
-                world = pin.SE3(_plane_axes(contact), world.translation)
+                world = pin.SE3((contact.plane or Plane()).axes, world.translation)
             found.append(world)
         return tuple(found)
 
@@ -229,7 +229,7 @@ class Stance:
         """Stacked forces as one spatial force per joint of the model, in the joint's frame."""
         external = [pin.Force.Zero() for _ in range(self.robot.model.njoints)]
         for contact, wrench in zip(self.contacts, self.unstack(forces), strict=True):
-            joint, placement = _attachment(self.robot, contact)
+            joint, placement = contact.on(self.robot)
             if contact.kind == "point":
                 wrench = np.concatenate([self._point_axes(contact).T @ wrench[:3], np.zeros(3)])
             external[joint] += placement.act(pin.Force(wrench))
@@ -267,7 +267,7 @@ class Stance:
         pin.computeForwardKinematicsDerivatives(model, data, self.q, velocity, zero)
         blocks = []
         for contact in self.contacts:
-            joint, placement = _attachment(self.robot, contact)
+            joint, placement = contact.on(self.robot)
             derivative = pin.getFrameVelocityDerivatives(model, data, joint, placement, _LOCAL)[0]
             if contact.kind == "point":
                 local = self._local_jacobian(contact)
@@ -286,31 +286,14 @@ class Stance:
         return np.asarray(moving - at_rest)
 
     def _local_jacobian(self, contact: Contact) -> Float[np.ndarray, "6 nv"]:
-        joint, placement = _attachment(self.robot, contact)
+        joint, placement = contact.on(self.robot)
         return pin.getFrameJacobian(self.robot.model, self._data, joint, placement, _LOCAL)
 
     def _point_axes(self, contact: Contact) -> Float[np.ndarray, "3 3"]:
         """Rotation from the foot's local axes to a point contact's axes, fixed in the world."""
-        joint, placement = _attachment(self.robot, contact)
+        joint, placement = contact.on(self.robot)
         world = self._data.oMi[joint].rotation @ placement.rotation
-        return _plane_axes(contact).T @ world
-
-
-def _attachment(robot: Robot, contact: Contact) -> tuple[int, pin.SE3]:
-    """The joint that carries a contact, and the contact frame's placement on it."""
-    frame = robot.frame(contact.frame)
-    return int(frame.parentJoint), frame.placement * pin.SE3(
-        contact.rotation, np.array(contact.offset)
-    )
-
-
-def _plane_axes(contact: Contact) -> Float[np.ndarray, "3 3"]:
-    """World axes of a point contact: z the plane's normal, x the nearest to the world's x."""
-    z = np.array(contact.plane.normal if contact.plane else (0.0, 0.0, 1.0))
-    nearest = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    x = nearest - z * (z @ nearest)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+        return (contact.plane or Plane()).axes.T @ world
 
 
 def _check_planes(stance: Stance) -> None:
