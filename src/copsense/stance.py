@@ -12,8 +12,14 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from copsense.arrays import array_property
 from copsense.contact import COMPONENT_NAMES, Contact, Plane
-from copsense.errors import ContactGeometryError, InsufficientContactsError, InvalidInputError
+from copsense.errors import (
+    ContactGeometryError,
+    InsufficientContactsError,
+    InvalidInputError,
+    UnknownNameError,
+)
 from copsense.robot import Robot
 
 _LOCAL = pin.ReferenceFrame.LOCAL
@@ -164,22 +170,33 @@ class Stance:
         model = self.robot.model
         return pin.crba(model, model.createData(), self.q, pin.Convention.WORLD)
 
-    @cached_property
+    @array_property
     def joint_limit_excess(self) -> Float[np.ndarray, " n"]:
         """How far each joint stands beyond the model's limits, zero within them [rad, m].
 
         Nothing here keeps a posture within them: this says where one is not.
         """
-        model, excess = self.robot.model, np.zeros(len(self.robot.torque_names))
-        for joint in list(model.joints)[2:]:
-            if joint.nq == 1:  # others have no limits to exceed
-                low, high = (
-                    model.lowerPositionLimit[joint.idx_q],
-                    model.upperPositionLimit[joint.idx_q],
-                )
-                beyond = max(low - self.q[joint.idx_q], self.q[joint.idx_q] - high, 0.0)
-                excess[joint.idx_v - self.robot.base_nv] = beyond if low < high else 0.0
+        (lower, upper), excess = self.robot.position_limits, np.zeros(len(self.robot.torque_names))
+        at, q = self.robot.single_joints
+        beyond = np.maximum(lower[at] - self.q[q], self.q[q] - upper[at])
+        excess[at] = np.maximum(beyond, 0.0)
         return excess
+
+    def limb(self, contact: Contact | str) -> tuple[int, ...]:
+        """Joints of the model between the base and a contact, the base's own left out.
+
+        Args:
+            contact: one of the stance's contacts, or its name.
+
+        Raises:
+            UnknownNameError: no contact has this name.
+        """
+        if isinstance(contact, str):
+            if contact not in self.contact_names:
+                raise UnknownNameError("contact", contact, self.contact_names)
+            contact = self.contacts[self.contact_names.index(contact)]
+        joint = self.robot.frame(contact.frame).parentJoint
+        return tuple(int(i) for i in self.robot.model.supports[joint] if i > 1)
 
     @cached_property
     def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

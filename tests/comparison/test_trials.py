@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import typing
 
 import numpy as np
 import pytest
@@ -22,9 +21,10 @@ from copsense.comparison import (
     predict_impulse,
     run_case,
 )
-from copsense.comparison.bench import Bench
+from copsense.comparison.case_runner import CaseRunner
 from copsense.comparison.prediction import statics
-from copsense.comparison.trials import SCORES, trial_named
+from copsense.comparison.score_kinds import SCORES
+from copsense.comparison.trials import trial_named
 from copsense.controllers import Ramp, Sine, lateral_reference
 from copsense.limits import Limits
 from copsense.path import lateral_sweep
@@ -58,8 +58,8 @@ def test_the_paper_s_sway_tells_the_criteria_apart():
     )
     assert found["com_error"].value < 1e-4
     case = one(Sway(0.039, 0.05, 0.26), C2, robot=FULL)
-    bench = Bench(case)
-    run = bench.run(bench.reference(Sine(0.039, 0.05)), 5.2).sel(time=slice(0.1, None))
+    runner = CaseRunner(case)
+    run = runner.run(runner.reference(Sine(0.039, 0.05)), 5.2).sel(time=slice(0.1, None))
     error = (run["com"] - run["com_target"]).sel(com_axis="y").values
     assert found["com_error"].value == np.sqrt(np.mean(error**2))
     for name in ("torque_norm", "torque_peak"):
@@ -121,7 +121,21 @@ def test_a_breaking_point_lies_between_survival_and_failure():
 
 
 class _Ended:
-    attrs: typing.ClassVar = {"end_kind": "completed"}
+    def __init__(self, kind="completed"):
+        self.attrs = {"end_kind": kind}
+
+
+@pytest.mark.parametrize(("fell", "repeats"), [(0, 5), (1, 7), (10, 20), (19, 20), (20, 20)])
+def test_a_rate_has_wilsons_interval(fell, repeats, monkeypatch):
+    ends = iter(["fall"] * fell + ["completed"] * (repeats - fell))
+    monkeypatch.setattr(CaseRunner, "run", lambda *a, **k: _Ended(next(ends)))
+    (found,) = run_case(one(Falls(repeats=repeats), WITHIN, FULL))
+    # Wilson 1927, doi:10.2307/2276774, as the roots p of (p - rate)^2 = z^2 p (1 - p) / n.
+    z2, rate = 1.959963984540054**2 / repeats, fell / repeats
+    roots = np.sort(np.roots([1 + z2, -2 * rate - z2, rate**2]).real)
+    assert (found.low, found.high) == pytest.approx(tuple(roots), abs=1e-9)
+    assert found.value == rate
+    assert 0.0 <= found.low <= rate <= found.high <= 1.0
 
 
 def test_falls_are_a_seeded_rate_with_its_interval(monkeypatch):
@@ -129,11 +143,10 @@ def test_falls_are_a_seeded_rate_with_its_interval(monkeypatch):
     (once,), (again,) = (run_case(one(gentle, WITHIN, FULL)) for _ in range(2))
     assert once == again
     assert (once.value, once.low) == (0.0, 0.0)
-    assert once.high == pytest.approx(copsense.comparison.wilson_interval(0, 2)[1])
     assert once.runs == 2
     draws = []
     with monkeypatch.context() as patched:
-        patched.setattr(Bench, "run", lambda *a, **k: draws.append(k) or _Ended())
+        patched.setattr(CaseRunner, "run", lambda *a, **k: draws.append(k) or _Ended())
         for seed in (0, 0, 1):
             run_case(one(Falls(0.02, 2, seed=seed), WITHIN, FULL))
     first, second, again, _, other, _ = [(d["push"], d["seed"]) for d in draws]
@@ -224,7 +237,7 @@ def test_a_longer_push_needs_more_impulse(stance):
 
 
 def test_the_legs_are_between_the_base_and_the_contacts():
-    joints = Bench(one(LEAN)).leg_joints
+    joints = CaseRunner(one(LEAN)).leg_joints
     assert len(joints) == 12
     assert all(joint[:6] in ("l_hip_", "r_hip_", "l_knee", "r_knee", "l_ankl", "r_ankl")
                for joint in joints)  # fmt: skip

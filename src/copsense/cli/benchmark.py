@@ -99,7 +99,7 @@ def benchmark(
     Exit code 1 where a run failed.
     """
     from copsense.comparison import read_plan, run_benchmark
-    from copsense.comparison.run import check_plan, finished_scores
+    from copsense.comparison.benchmark_run import check_plan, finished_scores
     from copsense.storage import check_output
 
     if importlib.util.find_spec("mujoco") is None:

@@ -17,7 +17,7 @@ from copsense.controllers.target import PathReference, Ramp, Signal, lateral_ref
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.limits import Limits
-from copsense.simulation.settings import PhysicsSettings
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.stance import Stance
 from copsense.statics import solve_equilibrium
 

@@ -1,4 +1,4 @@
-"""Watch: when a rollout is over, and why."""
+"""EventDetector: when a rollout is over, and why."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Event:
     contact: str = ""
 
 
-class Watch:
+class EventDetector:
     """Looks at every snapshot of one rollout."""
 
     def __init__(self, stance: Stance, thresholds: Thresholds) -> None:

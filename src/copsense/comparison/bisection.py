@@ -1,4 +1,4 @@
-"""Intervals: how sure a rate, a correlation or a bisected value is."""
+"""Bisection: between which two values a robot that survives stops surviving."""
 
 from __future__ import annotations
 
@@ -9,32 +9,6 @@ from dataclasses import dataclass
 from copsense.errors import InvalidInputError
 
 _FINEST = 1_000_000  # steps of a bisection
-_Z = 1.959963984540054  # of a two-sided 95 % interval
-
-
-def wilson_interval(hits: int, count: int) -> tuple[float, float]:
-    """The 95 % interval of a rate of `hits` in `count`, Wilson 1927, doi:10.2307/2276774.
-
-    Unlike the usual one it stays in [0, 1] and says something for no hits at all.
-    """
-    if count < 1:
-        return 0.0, 1.0
-    p, z2 = hits / count, _Z**2 / count
-    middle = (p + z2 / 2) / (1 + z2)
-    half = _Z / (1 + z2) * math.sqrt(p * (1 - p) / count + z2 / (4 * count))
-    # No hits and all hits have an end in common with the rate; rounding must not pass it.
-    low = 0.0 if hits == 0 else middle - half
-    return low, 1.0 if hits == count else middle + half
-
-
-def fisher_interval(correlation: float, count: int) -> tuple[float, float]:
-    """The 95 % interval of Pearson's r over `count` cases, by Fisher's z; NaN under four."""
-    if count < 4 or not abs(correlation) <= 1:
-        return math.nan, math.nan
-    if abs(correlation) == 1:
-        return correlation, correlation
-    z, half = math.atanh(correlation), _Z / math.sqrt(count - 3)
-    return math.tanh(z - half), math.tanh(z + half)
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,9 @@ def test_a_run_that_was_stopped_goes_on(whole, tmp_path):
 
 def test_a_finished_table_is_not_run_again(whole, monkeypatch):
     path, table = whole
-    monkeypatch.setattr("copsense.comparison.run.run_case", lambda *_: pytest.fail("it ran"))
+    monkeypatch.setattr(
+        "copsense.comparison.benchmark_run.run_case", lambda *_: pytest.fail("it ran")
+    )
     assert run_benchmark(plan(), path).equals(table)
 
 
@@ -259,7 +261,7 @@ def test_new_code_of_a_controller_is_another_parameter(tmp_path, monkeypatch):
     mine = ControllerChoice("minimum-wrench", source="changing_controllers:good", name="mine")
     module.write_text(OWN)
     with monkeypatch.context() as patched:
-        patched.setattr("copsense.comparison.run.score_trial", lambda bench: 1 / 0)
+        patched.setattr("copsense.comparison.benchmark_run.score_trial", lambda bench: 1 / 0)
         run_benchmark(plan([LEAN], [mine, C2]), table)
     # What failed is run again, and its code may be another by now.
     module.write_text(OWN + "\n# mended")
@@ -305,7 +307,7 @@ def test_a_key_is_that_of_the_parameters(monkeypatch):
     assert again.key == one(LEAN).key
     assert one(Lean(0.015, 0.021)).key != again.key
     assert one(LEAN, C2).key != again.key
-    monkeypatch.setattr("copsense.comparison.cases._software", lambda: {"mujoco": "9.9"})
+    monkeypatch.setattr("copsense.comparison.case._software", lambda: {"mujoco": "9.9"})
     assert one(LEAN).key != again.key
 
 

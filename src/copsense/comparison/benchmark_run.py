@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pandas as pd
 
-from copsense.comparison.bench import Bench
-from copsense.comparison.cases import Case
-from copsense.comparison.score import Score, failed, score_trial
+from copsense.comparison.case import Case
+from copsense.comparison.case_runner import CaseRunner
+from copsense.comparison.score import Score, failed
+from copsense.comparison.scoring import score_trial
 from copsense.comparison.table import (
     differences,
     load_benchmark,
@@ -30,7 +31,7 @@ def run_case(case: Case, progress: Callable[[float], object] | None = None) -> l
         progress: called with the simulated time since the last call [s].
     """
     try:
-        return score_trial(Bench(case, progress))
+        return score_trial(CaseRunner(case, progress))
     except CopsenseError as error:
         return failed(case.trial.scores, str(error))
     except (Exception, SystemExit) as error:  # a user's controller or a library: its row says so

@@ -22,8 +22,8 @@ from copsense.errors import (
     UnknownNameError,
 )
 from copsense.robot import Robot
-from copsense.simulation.model import build_model
-from copsense.simulation.settings import PhysicsSettings
+from copsense.simulation.mujoco_model import build_model
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
 from copsense.stance import Stance
 

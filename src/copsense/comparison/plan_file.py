@@ -1,54 +1,21 @@
-"""Plans: cases as a product of choices, or from a TOML file."""
+"""Plan files: the cases of a benchmark, written in TOML."""
 
 from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import is_dataclass
-from itertools import product
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
-from copsense.comparison.building import as_table, build, check_fields
-from copsense.comparison.cases import (
-    Case,
-    Conditions,
-    ControllerChoice,
-    PostureChoice,
-    RobotChoice,
-)
+from copsense.comparison.case import IDEAL, Case, make_plan
+from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
+from copsense.comparison.plan_values import as_table, build, check_fields
 from copsense.comparison.trials import Trial, trial_named
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.simulation import Scenario
-
-IDEAL = Conditions()
-
-
-def make_plan(
-    robots: Sequence[RobotChoice],
-    postures: Sequence[PostureChoice],
-    controllers: Sequence[ControllerChoice],
-    trials: Sequence[Trial] | Mapping[str, Trial],
-    conditions: Sequence[Conditions] = (IDEAL,),
-) -> tuple[Case, ...]:
-    """Every robot in every posture under every controller in all conditions and trials.
-
-    Args:
-        robots: which robots.
-        postures: how they stand.
-        controllers: what balances them.
-        trials: what they are put through; a mapping names them.
-        conditions: what disturbs them.
-    """
-    named = trials if isinstance(trials, Mapping) else {trial.kind: trial for trial in trials}
-    return tuple(
-        Case(robot, posture, controller, trial, condition, name)
-        for robot, posture, condition, (name, trial), controller in product(
-            robots, postures, conditions, named.items(), controllers
-        )
-    )
 
 
 def read_plan(path: str | Path) -> tuple[Case, ...]:

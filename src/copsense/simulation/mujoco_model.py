@@ -15,8 +15,8 @@ import pinocchio as pin
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
 from copsense.robot import Robot
-from copsense.simulation.settings import PhysicsSettings
-from copsense.simulation.supports import support_points
+from copsense.simulation.physics_settings import PhysicsSettings
+from copsense.simulation.support_points import support_points
 from copsense.stance import Stance
 
 _POINT = 1e-4  # m: radius of the ball at each support point

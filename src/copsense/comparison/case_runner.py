@@ -1,4 +1,4 @@
-"""Bench: a case's robot, engine and controller, made once and run as often as a trial asks."""
+"""CaseRunner: a case's robot, simulator and controller, built once and run for each trial."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import xarray as xr
 
-from copsense.comparison.cases import Case
+from copsense.comparison.case import Case
 from copsense.comparison.prediction import Statics, statics
 from copsense.controllers import (
     BalancingController,
@@ -27,7 +27,7 @@ from copsense.stance import Stance
 _SHORTER = 0.85  # a lean out of reach is tried again, so much shorter
 
 
-class Bench:
+class CaseRunner:
     """What the trials of `score` work with.
 
     Args:
