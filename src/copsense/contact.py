@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -13,6 +13,7 @@ from jaxtyping import Float
 from copsense.arrays import finite_array
 from copsense.errors import InvalidInputError
 from copsense.polygon import Polygon
+from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
 Kind = Literal["surface", "point", "planar"]
@@ -158,18 +159,6 @@ class Contact:
         frame = robot.frame(self.frame)
         offset = pin.SE3(self.rotation, np.array(self.offset))
         return Attachment(int(frame.parentJoint), frame.placement * offset)
-
-
-class Attachment(NamedTuple):
-    """Where on a robot a contact is.
-
-    Attributes:
-        joint: index in the model of the joint whose link carries the contact.
-        placement: of the contact frame in that joint's frame.
-    """
-
-    joint: int
-    placement: pin.SE3
 
 
 def rectangle(

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +19,14 @@ from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
 
+# Joints that slide along some of their axes, and the unit along or about each.
+_SLIDING = {
+    **dict.fromkeys(("PX", "PY", "PZ", "PrismaticUnaligned"), ("m",)),
+    "Translation": ("m",) * 3,
+    "Planar": ("m", "m", "rad"),
+    "FreeFlyer": ("m",) * 3 + ("rad",) * 3,
+}
+
 # Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
 _BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
 
@@ -27,7 +36,7 @@ PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 _NO_POSITION = 1e30  # rad, or m
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A floating-base robot at no particular posture.
 
@@ -240,6 +249,20 @@ class Robot:
             )
         return int(model_joint.idx_v)
 
+    @cached_property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of the position behind each torque: ``"rad"``, or ``"m"`` if it slides."""
+        units: list[str] = []
+        for joint in list(self.model.joints)[2:]:
+            kind = joint.shortname().removeprefix("JointModel")
+            units += _SLIDING.get(kind, ("rad",) * joint.nv)
+        return tuple(units)
+
+    def joint_unit(self, joint: str) -> Literal["rad", "m"]:
+        """Unit of a one-degree-of-freedom joint's position: ``"rad"``, or ``"m"`` if it slides."""
+        unit = self.torque_units[self.velocity_index(joint) - self.base_nv]
+        return "m" if unit == "m" else "rad"
+
     def joint_position(self, q: Float[np.ndarray, " nq"], joint: str) -> float:
         """Position [rad or m] of a one-degree-of-freedom joint at a configuration."""
         self.velocity_index(joint)
@@ -286,20 +309,30 @@ class Robot:
         Raises:
             InvalidInputError: wrong shape, NaN or infinity, or an unnormalised quaternion.
         """
-        meaning = (
-            f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
-            if self.base_nv == 6
-            else f"base position, cosine and sine, then {len(self.joint_names)} joints"
-        )
-        array = finite_array(
-            q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
-        )
+        if isinstance(q, np.ndarray) and q.shape == (self.model.nq,) and q.dtype == float:
+            array = q if np.isfinite(q).all() else self._configuration(q)
+        else:
+            array = self._configuration(q)
         if not pin.isNormalized(self.model, array, 1e-6):
             raise InvalidInputError(
                 "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
                 "length. Give it in the order x, y, z, w; pin.normalize(model, q) fixes rounding."
             )
         return read_only(pin.normalize(self.model, array))
+
+    def _configuration(self, q: object) -> Float[np.ndarray, " nq"]:
+        meaning = (
+            f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
+            if self.base_nv == 6
+            else f"base position, cosine and sine, then {len(self.joint_names)} joints"
+        )
+        return finite_array(
+            q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
+        )
+
+    def __repr__(self) -> str:
+        """Name, joints and mass."""
+        return f"Robot({self.name!r}, {len(self.torque_names)} joints, {self.mass:.4g} kg)"
 
 
 def build_model(description: Description) -> pin.Model:
