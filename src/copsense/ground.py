@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from copsense.polygon import padded
 from copsense.stance import Stance
 
 CONVENTIONS = (
@@ -32,13 +33,11 @@ def ground_variables(stance: Stance) -> dict[str, Any]:
             {"units": "1", "long_name": "columns: contact axes in world axes"},
         ),
     }
-    polygons = [c.polygon for c in stance.contacts]
-    if any(p is not None for p in polygons):
-        known = [np.full((1, 2), np.nan) if p is None else p for p in polygons]
-        longest = max(len(p) for p in known)
+    soles = [c.sole for c in stance.contacts]
+    if any(soles):
         found["sole_polygon"] = (
             ("contact", "vertex", "axis"),
-            np.array([np.vstack([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in known]),
+            padded(soles),
             {
                 "units": "m",
                 "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",

@@ -151,7 +151,7 @@ def sweep_dataset(path: PosturePath, rows: SweepRows, attributes: Mapping[str, s
             "contact_frames": ", ".join(c.frame for c in stance.contacts),
             "contact_kinds": ", ".join(c.kind for c in stance.contacts),
             "without_sole": ", ".join(
-                c.name for c in stance.contacts if c.kind != "point" and c.polygon is None
+                c.name for c in stance.contacts if c.kind != "point" and c.sole is None
             ),
             **attributes,
             "conventions": CONVENTIONS,

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from copsense.cop import edge_margin
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.labelled import LabelledResult, tidy_table
@@ -319,10 +318,10 @@ def _margins(found: CopSensitivity) -> list[tuple[float, str]]:
     """Margin and side of each contact; a contact without a sole has no edge to reach."""
     margins = []
     for contact, cop in zip(found.equilibrium.stance.contacts, found.cop, strict=True):
-        if contact.polygon is None or contact.kind == "point":
+        if contact.sole is None:
             margins.append((np.inf, ""))
         else:
-            margin = edge_margin(contact.polygon, cop)
+            margin = contact.sole.margin(cop)
             margins.append((margin.distance, margin.side))
     return margins
 

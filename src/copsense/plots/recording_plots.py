@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.plots.reading import DEG, MM, contact_origins, cross_section, labels, world_soles
+from copsense.plots.reading import DEG, MM, contact_origins, labels, world_soles
 from copsense.plots.sole_plots import draw_ground, draw_track, frame_ground
 from copsense.plots.style import (
     COM_LINE,
@@ -23,6 +23,7 @@ from copsense.plots.style import (
     put_legend,
     styled,
 )
+from copsense.polygon import Polygon, unpadded
 from copsense.simulation import Event, Recording
 
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -116,7 +117,11 @@ def _draw_cop(ax: Axes, recording: Recording, colour: dict[str, str]) -> None:
     cops, soles = _world_cop(recording, "cop"), world_soles(recording)
     for k, (name, c) in enumerate(colour.items()):
         sole, known = soles[k], cops[np.isfinite(cops[:, k, 0]), k, 0]
-        found = None if sole is None else cross_section(sole, "y", float(np.median([*known, 0.0])))
+        found = (
+            None
+            if sole is None
+            else Polygon.hull(sole).section("y", float(np.median([*known, 0.0])))
+        )
         if found:
             ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
             for edge in found:
@@ -260,10 +265,11 @@ def _local_edges(stood: Recording) -> dict[int, tuple[float, float]]:
     if "sole_polygon" not in stood:
         return found
     for k, polygon in enumerate(stood["sole_polygon"].values):
-        if np.isnan(polygon).any():
+        sole = unpadded(polygon * MM)
+        if sole is None:
             continue
         x = stood["cop"].values[:, k, 0]
         middle = float(np.median(x[np.isfinite(x)])) * MM if np.any(np.isfinite(x)) else 0.0
-        across = cross_section(polygon * MM, "y", middle)
-        found[k] = across or (polygon[:, 1].min() * MM, polygon[:, 1].max() * MM)
+        whole = float(sole.vertices[:, 1].min()), float(sole.vertices[:, 1].max())
+        found[k] = sole.section("y", middle) or whole
     return found

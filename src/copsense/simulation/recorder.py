@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense._version import __version__
-from copsense.contact import COMPONENT_NAMES, half_planes
+from copsense.contact import COMPONENT_NAMES
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
 from copsense.ground import CONVENTIONS, ground_variables
@@ -175,7 +175,6 @@ def _cops(stance: Stance, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     cops = np.stack([-wrenches[:, :, 4] / fz, wrenches[:, :, 3] / fz], axis=2)
     margins = np.full(cops.shape[:2], np.nan)
     for k, contact in enumerate(stance.contacts):
-        if contact.kind != "point" and contact.polygon is not None:
-            normals, offsets = half_planes(contact.polygon)
-            margins[:, k] = (offsets - cops[:, k] @ normals.T).min(axis=1)
+        if contact.sole:
+            margins[:, k] = contact.sole.margins(cops[:, k])
     return cops, margins
