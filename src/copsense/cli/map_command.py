@@ -289,7 +289,9 @@ def _print(summary: MapSummary, plot: str | None) -> None:
             middle = row.travel_percentiles[50.0]
             click.echo(
                 f"    CoM travel: worst {worst.value * 1e3:+.1f} mm at "
-                f"{_place(worst.coordinates, units)}; median {middle * 1e3:+.1f} mm"
+                f"{_place(worst.coordinates, units)}"
+                + (f" (edge {worst.tipping_edge} of {worst.contact})" if worst.contact else "")
+                + f"; median {middle * 1e3:+.1f} mm"
             )
         if row.worst_gain:
             gain = row.worst_gain[0]
