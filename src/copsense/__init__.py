@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     from copsense.binding import LimitChange, next_change
     from copsense.contact import Contact, Plane, rectangle
     from copsense.cop import (
-        EdgeMargin,
         center_of_pressure,
         com_projection,
         contact_cops,
-        edge_margin,
         foot_rotation_indicator,
         total_center_of_pressure,
         zero_moment_point,
@@ -45,6 +43,7 @@ if TYPE_CHECKING:
     from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
     from copsense.margins import limit_margins, limit_travel
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
+    from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
     from copsense.recorded import with_limit_margins
     from copsense.regions import ComRegion, com_region, com_regions, criterion_region
@@ -92,6 +91,7 @@ __all__ = [
     "LimitChange",
     "Limits",
     "Plane",
+    "Polygon",
     "Posture",
     "PostureCost",
     "PosturePath",
@@ -114,7 +114,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "edge_margin",
     "failed_rows",
     "families",
     "finite_difference_sensitivity",
@@ -167,11 +166,9 @@ _HOMES = {
         "rectangle",
     ),
     "copsense.cop": (
-        "EdgeMargin",
         "center_of_pressure",
         "com_projection",
         "contact_cops",
-        "edge_margin",
         "foot_rotation_indicator",
         "total_center_of_pressure",
         "zero_moment_point",
@@ -213,6 +210,10 @@ _HOMES = {
         "joint_sweep",
         "lateral_sweep",
         "path_through",
+    ),
+    "copsense.polygon": (
+        "EdgeMargin",
+        "Polygon",
     ),
     "copsense.posture": (
         "Posture",

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
-from copsense.cop import edge_margin, total_center_of_pressure
+from copsense.cop import total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
@@ -160,8 +160,8 @@ class Analysis:
             }
             if self.along is not None:
                 row[f"cop_per_{self.along}"] = found.along_joint(self.tangent, self.along)[k]
-            if contact.polygon is not None and contact.kind != "point":
-                margin = edge_margin(contact.polygon, found.cop[k])
+            if contact.sole is not None:
+                margin = contact.sole.margin(found.cop[k])
                 row |= {
                     "margin": margin.distance,
                     "margin_edge": margin.edge,

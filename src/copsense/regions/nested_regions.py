@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from copsense.criterion import Criterion
 from copsense.limits import Limits
-from copsense.regions.criterion import criterion_region
-from copsense.regions.feasible import com_region
+from copsense.regions.feasible_region import com_region
 from copsense.regions.region import ComRegion
+from copsense.regions.unclipped_region import criterion_region
 from copsense.stance import Stance
 
 
