@@ -206,6 +206,8 @@ def analyse(
         raise InvalidInputError(
             f"{stance!r} is not a stance. Make one with copsense.load_stance(...)."
         )
+    if isinstance(criteria, Criterion):
+        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
     chosen = _named(criteria)
     if along is not None:
         stance.robot.velocity_index(along)
@@ -234,8 +236,6 @@ def _named(
 ) -> dict[str, Criterion | WrenchPolicy]:
     if criteria is None:
         criteria = (minimum_wrench(1.0), minimum_torque())
-    if isinstance(criteria, Criterion):
-        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
     named = {c.name if isinstance(c, Criterion) else policy_name(c): c for c in criteria}
     if not named or len(named) != len(criteria):
         names = ", ".join(named) or "none"
