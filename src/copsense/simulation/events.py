@@ -67,10 +67,7 @@ class EventDetector:
         self._origins = np.array([p.translation for p in stance.placements])
         self._turns = np.array([c.kind != "point" for c in stance.contacts])
         self._axes = np.array([p.rotation for p in stance.placements])
-        self._corners = [
-            np.zeros((1, 2)) if c.kind == "point" or c.polygon is None else np.array(c.polygon)
-            for c in stance.contacts
-        ]
+        self._corners = [c.sole.vertices if c.sole else np.zeros((1, 2)) for c in stance.contacts]
         self._reach = np.array([np.linalg.norm(c, axis=1).max() for c in self._corners])
         self._ground = float(self._origins[:, 2].mean())
         self._height = float(stance.com[2]) - self._ground

@@ -113,9 +113,8 @@ def _add_contact(
     settings: PhysicsSettings,
 ) -> None:
     """Add a contact's frame, its support points and the plane below them."""
-    frame = robot.frame(contact.frame)
-    body = bodies[frame.parentJoint]
-    place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+    at = contact.on(robot)
+    body, place = bodies[at.joint], at.placement
     body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=_wxyz(place))
     up = world.rotation[:, 2]
     point = contact.kind == "point"

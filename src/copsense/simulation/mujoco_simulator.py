@@ -300,14 +300,13 @@ def _feet(stance: Stance) -> tuple[tuple[float, np.ndarray], ...]:
     """Mass of the link of each contact, and its centre in the contact frame [m]."""
     robot, found, links = stance.robot, [], set()
     for contact in stance.contacts:
-        frame = robot.frame(contact.frame)
-        if frame.parentJoint in links or frame.parentJoint < 2:
+        at = contact.on(robot)
+        if at.joint in links or at.joint < 2:
             raise InvalidInputError(
                 f"contact {contact.name!r} shares its link with another contact, or is on the "
                 'base: a sensor cannot tell them apart. Measure wrenches from "contacts".'
             )
-        links.add(frame.parentJoint)
-        place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
-        inertia = robot.model.inertias[frame.parentJoint]
-        found.append((float(inertia.mass), place.actInv(inertia.lever)))
+        links.add(at.joint)
+        inertia = robot.model.inertias[at.joint]
+        found.append((float(inertia.mass), at.placement.actInv(inertia.lever)))
     return tuple(found)

@@ -46,10 +46,8 @@ class FootOdometry:
         self._model, self._data = stance.robot.model, stance.robot.model.createData()
         self._feet = []
         for k in surface:
-            c = stance.contacts[k]
-            frame = stance.robot.frame(c.frame)
-            place = frame.placement * pin.SE3(c.rotation, np.array(c.offset))
-            self._feet.append((int(frame.parentJoint), place))
+            at = stance.contacts[k].on(stance.robot)
+            self._feet.append((at.joint, at.placement))
         self._foot = 0 if self._fixed is None else self._fixed
         self._weight = stance.robot.weight
 

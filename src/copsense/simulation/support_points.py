@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from copsense.contact import Contact, half_planes
+from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.polygon import Polygon
 
 
 def support_points(contact: Contact, detail: float) -> Float[np.ndarray, "k 2"]:
@@ -26,12 +27,13 @@ def support_points(contact: Contact, detail: float) -> Float[np.ndarray, "k 2"]:
             f"contact {contact.name!r} is planar, the simulation is spatial. Use surface or point "
             "contacts."
         )
-    if contact.polygon is None or len(contact.polygon) < 3:
+    sole = contact.sole
+    if sole is None or len(sole) < 3:
         raise InvalidInputError(
             f"contact {contact.name!r} has no sole to stand on. "
             "Give Contact(..., polygon=rectangle(...)) (--sole X0:X1:Y0:Y1)."
         )
-    polygon, kept = contact.polygon, list(contact.polygon)
+    kept = list(sole.vertices)
     while len(kept) > 3:
         # How far each vertex stands out of the line through its neighbours.
         corners = np.array(kept)
@@ -40,8 +42,7 @@ def support_points(contact: Contact, detail: float) -> Float[np.ndarray, "k 2"]:
         rest = corners - before
         least = int(np.argmin(np.abs(along[:, 0] * rest[:, 1] - along[:, 1] * rest[:, 0])))
         fewer = np.delete(corners, least, axis=0)
-        normals, offsets = half_planes(fewer)
-        if (polygon @ normals.T - offsets).max() > detail:
+        if -Polygon(fewer).margins(sole.vertices).min() > detail:
             break
         kept.pop(least)
     return np.array(kept)

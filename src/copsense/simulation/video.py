@@ -173,13 +173,12 @@ def _screen(stance: Stance) -> Iterator[Callable[[xr.Dataset, int], np.ndarray]]
                 if np.linalg.norm(end - start) > radius / 4:
                     _capsule(mujoco, scene, start, end, radius, _LINK)
             for k, contact in enumerate(stance.contacts):
-                frame = stance.robot.frame(contact.frame)
-                place = data.oMi[frame.parentJoint] * frame.placement
-                place = place * pin.SE3(contact.rotation, np.array(contact.offset))
-                ankle = data.oMi[frame.parentJoint].translation
+                at = contact.on(stance.robot)
+                place = data.oMi[at.joint] * at.placement
+                ankle = data.oMi[at.joint].translation
                 _capsule(mujoco, scene, ankle, place.translation, 0.7 * radius, _LINK)
-                if contact.polygon is not None and contact.kind != "point":
-                    corners = [place.act(np.array([*p, 0.0])) for p in contact.polygon]
+                if contact.sole:
+                    corners = [place.act(np.array([*p, 0.0])) for p in contact.sole.vertices]
                     for p, q in zip(corners, [*corners[1:], corners[0]], strict=True):
                         _capsule(mujoco, scene, p, q, 0.15 * radius, _FOOT)
                 cop = recording["cop"].values[row, k]

@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from tqdm import tqdm
 
-from copsense.cli.options import criterion_options, echo_json, read_limits
+from copsense.cli.criterion_options import criterion_options
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written
 from copsense.errors import InvalidInputError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -141,8 +142,7 @@ def benchmark(
         echo_json(_summary(plan, table))
     else:
         _print(plan, table)
-        for written in filter(None, (output, picture)):
-            click.echo(f"written: {written}")
+        echo_written(output, picture)
     wrong = table[table["status"] == "failed"].drop_duplicates("key")
     for row in wrong.head(5).itertuples():
         label = " / ".join((row.robot, row.posture, row.controller, row.trial))
@@ -290,6 +290,8 @@ def _number_or_word(text: str) -> float | int | str:
 @contextmanager
 def _bar() -> Iterator[Any]:
     """A bar with the time left on standard error, where somebody is there to see it."""
+    from tqdm import tqdm
+
     shape = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"
     with tqdm(
         total=1.0, desc="benchmark", bar_format=shape, disable=None, leave=False, smoothing=0.05
