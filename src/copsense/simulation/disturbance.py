@@ -63,7 +63,7 @@ class Motors:
         delay: [s]; a command takes effect this much later.
         bandwidth: of a first-order low-pass [Hz], or None for immediate torques.
         limit: greatest torque of every joint [Nm], joint -> limit (others unlimited),
-            ``"model"`` for the model's effort limits, or None.
+            ``"model"`` for `Robot.effort_limits`, or None.
     """
 
     delay: float = 0.0

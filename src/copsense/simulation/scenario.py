@@ -90,6 +90,23 @@ class Scenario:
             )
         return steps
 
+    def friction_at_start(self, stance: Stance, usual: float) -> dict[str, float]:
+        """Coulomb coefficient of the ground under each contact when the scenario starts.
+
+        A change of friction at time zero replaces a contact's own coefficient, as it does in the
+        simulation.
+
+        Args:
+            stance: gives the contacts, by whose names the coefficients are returned.
+            usual: coefficient of contacts without one of their own, `PhysicsSettings.friction`.
+        """
+        found = {c.name: usual if c.friction is None else c.friction for c in stance.contacts}
+        for change in self.friction:
+            if change.start <= 0:
+                names = found if change.contact is None else [change.contact]
+                found |= dict.fromkeys(names, change.friction)
+        return found
+
     def check_stance(self, stance: Stance) -> None:
         """Reject joints, frames and contacts that the robot does not have.
 
