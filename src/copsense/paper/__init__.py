@@ -48,7 +48,7 @@ from copsense.paper.closed_form.four_bar_criteria import (
 )
 from copsense.paper.closed_form.linkage import Hand
 from copsense.paper.closed_form.printed import PRINTED_FORMS, PrintedForm
-from copsense.paper.errata.errata_table import ERRATA, Erratum, EvaluatedErratum, evaluate_errata
+from copsense.paper.errata import ERRATA, Erratum, EvaluatedErratum, evaluate_errata
 
 __all__ = [
     "ERRATA",

@@ -19,7 +19,7 @@ from copsense.paper.closed_form.between_feet import (
     by_wrench,
 )
 from copsense.paper.closed_form.dimensions import FourBar
-from copsense.paper.closed_form.discrepancy import EXACT, angle_at
+from copsense.paper.closed_form.discrepancy import EXACT
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
 
 
@@ -122,7 +122,7 @@ def _lower_sensitivity(four_bar: FourBar) -> Finding:
         ),
     )
     centre = excess[PARTS.size // 2]
-    angle = math.degrees(math.pi / 2 - angle_at(four_bar, crossing * d))
+    angle = math.degrees(math.pi / 2 - four_bar.angle_at(crossing * d))
     return Finding(
         judge(np.all(excess < 1 - EXACT), centre < 1 - EXACT),
         crossing,

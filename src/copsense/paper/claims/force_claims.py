@@ -18,7 +18,7 @@ from copsense.paper.closed_form.between_feet import (
     by_wrench,
 )
 from copsense.paper.closed_form.dimensions import FourBar
-from copsense.paper.closed_form.discrepancy import EXACT, angle_at, with_kappa
+from copsense.paper.closed_form.discrepancy import EXACT
 from copsense.paper.errata.errata_statements import pole
 
 _DEGREE = 0.5  # an angle printed in whole degrees
@@ -97,8 +97,8 @@ def _tends_to_zero(four_bar: FourBar) -> Finding:
 def _diverges_at_14(four_bar: FourBar) -> Finding:
     angle = math.degrees(pole(four_bar))
     over = [
-        math.degrees(math.pi / 2 - angle_at(linkage, linkage.rod_length / 2))
-        for linkage in (four_bar, with_kappa(four_bar, 0.6))
+        math.degrees(math.pi / 2 - linkage.angle_at(linkage.rod_length / 2))
+        for linkage in (four_bar, four_bar.with_kappa(0.6))
     ]
     needed = four_bar.kappa * math.sin(math.radians(14.0))
     return Finding(

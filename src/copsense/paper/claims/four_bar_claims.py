@@ -8,7 +8,6 @@ from copsense.paper.claims.force_claims import FORCE_CLAIMS
 from copsense.paper.claims.lemma_claims import LEMMA_CLAIMS
 from copsense.paper.claims.modelling_claims import MODEL_CLAIMS
 from copsense.paper.closed_form.dimensions import FourBar
-from copsense.paper.closed_form.discrepancy import angle_at
 
 FOUR_BAR_CLAIMS: tuple[CheckedClaim[FourBar], ...] = (
     *MODEL_CLAIMS,
@@ -31,5 +30,5 @@ def evaluate_four_bar_claims(four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
     Raises:
         InvalidInputError: the CoM cannot go that far.
     """
-    angle_at(four_bar, four_bar.rod_length)  # says what to change, before any claim is tried
+    four_bar.angle_at(four_bar.rod_length)  # says what to change, before any claim is tried
     return evaluate_claims(FOUR_BAR_CLAIMS, four_bar)

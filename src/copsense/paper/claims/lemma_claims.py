@@ -12,7 +12,6 @@ from copsense.paper.closed_form.discrepancy import (
     EXACT,
     relative_difference,
     sampled_angles,
-    with_kappa,
 )
 from copsense.paper.closed_form.lexicographic import (
     Objective,
@@ -86,7 +85,7 @@ def _derivative(four_bar: FourBar, *, given: str, differentiated: str) -> Findin
 
 
 def _specialises(four_bar: FourBar) -> Finding:
-    judged = with_kappa(four_bar, 0.75)
+    judged = four_bar.with_kappa(0.75)
     number = relative_difference(printed(judged, "(31)"), printed(judged, "(17)"), columns=1)
     return Finding(
         judge(number < EXACT),
