@@ -152,9 +152,13 @@ def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
     from copsense.paper.claims import VERDICT_STANDARD
     from copsense.paper.report import errata_markdown
 
-    standard = "\n".join(f"- *{verdict.value}*: {text}" for verdict, text in VERDICT_STANDARD.items())
+    standard = "\n".join(
+        f"- *{verdict.value}*: {text}" for verdict, text in VERDICT_STANDARD.items()
+    )
     for name, text in (("errata table", errata_markdown()), ("standard of verdicts", standard)):
-        source[0], count = re.subn(rf"^% {name}: .*$", lambda _: text, source[0], flags=re.MULTILINE)
+        source[0], count = re.subn(
+            rf"^% {name}: .*$", lambda _, text=text: text, source[0], flags=re.MULTILINE
+        )
         if count != 1:
             logger.warning("docs/theory.md has %d places for its %s, not one", count, name)
 

@@ -88,8 +88,8 @@ class _Parser:
 
     def sum(self) -> _Part:
         sign = self.take() if self.tokens[0] in {"-", "±", "∓"} else "+"
-        terms, text = [(sign, self.product())], "" if sign == "+" else _SIGNS[sign]
-        text += terms[0][1].latex
+        terms = [(sign, self.product())]
+        text = {"+": "", "-": "-"}.get(sign, f"{_SIGNS[sign]} ") + terms[0][1].latex
         while self.tokens[0] in _SIGNS:
             sign = self.take()
             terms.append((sign, self.product()))
@@ -164,6 +164,6 @@ def _product(parts: list[_Part]) -> Value:
 def _letter(name: str) -> str:
     stem, _, index = name.partition("_")
     if not index and re.fullmatch(r"[a-z]\d", name):
-        stem, index = name
+        stem, index = name[0], name[1]
     shown = rf"\{stem}" if stem in _GREEK else stem
     return f"{shown}_{{{index}}}" if index else shown
