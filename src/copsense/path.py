@@ -126,14 +126,14 @@ def joint_sweep(
         progress: called with 1 after each posture.
     """
     robot = stance.robot
-    kind = robot.model.joints[robot.joint_id(joint)].shortname()
-    unit = "m" if kind.startswith("JointModelP") else "rad"
     now = robot.joint_position(stance.q, joint)
 
     def request(position: float) -> dict[str, Any]:
         return {"joints": {joint: position}, "cost": cost}
 
-    return _sweep(stance, joint, unit, _grid(start, stop, count), now, request, 0, progress)
+    return _sweep(
+        stance, joint, robot.joint_unit(joint), _grid(start, stop, count), now, request, 0, progress
+    )
 
 
 def path_through(

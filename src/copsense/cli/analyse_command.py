@@ -1,0 +1,121 @@
+"""``copsense analyse``: one posture, and which way of sharing the load keeps its feet planted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import PICTURES, echo_json, echo_written
+from copsense.cli.quantities import LENGTH, read_positions
+from copsense.cli.region_text import region_data, region_lines, save_regions
+from copsense.cli.stance_options import read_stance, stance_options
+from copsense.errors import InvalidInputError
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png\n"
+    "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
+    "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
+)
+@stance_options
+@criterion_options
+@click.option("--com-x", type=LENGTH, metavar="LENGTH", help="World x of the CoM; default held.")
+@click.option(
+    "--com-y", type=LENGTH, metavar="LENGTH", help="World y of the CoM; default the middle."
+)
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    metavar="JOINT=POSITION",
+    help="Hold a joint there: degrees, or metres for a prismatic joint. Repeatable.",
+)
+@click.option(
+    "--along",
+    metavar="JOINT",
+    help="Report the sensitivity per this joint too (per degree, or per metre for a prismatic "
+    "joint), along the lateral path of the CoM.",
+)
+@click.option("--check", is_flag=True, help="Compare the derivatives with finite differences.")
+@click.option("--plot", "picture", type=click.Path(), help="Draw the stance: .png, .svg or .pdf.")
+@click.option(
+    "--regions",
+    type=click.Path(),
+    help="Draw the regions of the CoM that the limits leave, and report their areas: .png, .svg or "
+    ".pdf. Needs --limits.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the pictures.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def analyse(
+    robot: str,
+    criteria: tuple[str, ...],
+    characteristic_length: float,
+    limits: str | None,
+    com_x: float | None,
+    com_y: float | None,
+    joints: tuple[str, ...],
+    along: str | None,
+    check: bool,
+    picture: str | None,
+    regions: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Analyse one posture of ROBOT: centre of pressure, margin and sensitivity of each contact.
+
+    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. Lengths in the answer
+    are along the contact's axes: x forward, y left, z the normal. In Python: copsense.analyse.
+    """
+    from copsense.analysis import analyse as analyse_stance
+    from copsense.storage import check_output
+
+    for drawn in filter(None, (picture, regions)):
+        check_output(drawn, suffixes=PICTURES, overwrite=force)
+    if picture is not None and regions is not None and Path(picture) == Path(regions):
+        raise InvalidInputError("--plot and --regions name one file. Give each its own.")
+    within = read_limits(limits)
+    if regions is not None and (within is None or not within.any):
+        raise InvalidInputError(
+            "regions of the CoM are those that limits leave. Give --limits too, such as "
+            "--limits friction=0.33,torque=model."
+        )
+    chosen = read_criteria(criteria, characteristic_length)
+    home = read_stance(robot, **options)
+    analysis = analyse_stance(
+        home,
+        chosen,
+        within,
+        along,
+        com_x=com_x,
+        com_y=com_y,
+        joints=read_positions(joints, home.robot),
+        check=check,
+    )
+    answer = analysis.to_dict()
+    if regions is not None:
+        assert within is not None
+        found = save_regions(analysis.stance, chosen, within, regions, overwrite=force)
+        answer["regions"] = {"plot": regions, "of": region_data(found, analysis.stance)}
+    if picture is not None:
+        from copsense.plots import save_figure
+
+        save_figure(analysis.plot(), picture, overwrite=force)
+        answer["plot"] = picture
+    if as_json:
+        echo_json(answer)
+        return
+    click.echo(str(analysis))
+    for note in analysis.notes:
+        click.echo(f"note: {note}", err=True)
+    if check:
+        click.echo("derivatives agree with finite differences to 1e-7 relative")
+    if "regions" in answer:
+        for line in region_lines(answer["regions"]["of"]):
+            click.echo(line)
+    echo_written(regions, picture)

@@ -1,0 +1,39 @@
+"""What every command prints: JSON, a progress bar, and the files that were written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from copsense.json_data import json_data
+
+
+@contextmanager
+def progress_bar(
+    total: int | None, what: str, unit: str = "posture"
+) -> Iterator[Callable[[int], object]]:
+    """A bar with rate and time left on standard error, where someone is there to see it."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=what, unit=unit, disable=None, leave=False) as bar:
+        yield bar.update
+
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def echo_json(value: Mapping[str, Any]) -> None:
+    """Print JSON; infinities, which JSON lacks, become null."""
+    click.echo(json.dumps(json_data(value), indent=2, allow_nan=False))
+
+
+def echo_written(*paths: str | Path | None) -> None:
+    """Say of each file that it was written; None is passed over."""
+    for path in paths:
+        if path is not None:
+            click.echo(f"written: {path}")
