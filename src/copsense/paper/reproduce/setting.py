@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from copsense._version import __version__
-from copsense.paper import FourBar
+from copsense.paper.closed_form import FourBar
 from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
 from copsense.posture import PostureCost
 from copsense.robots import PRESETS
