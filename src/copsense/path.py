@@ -126,14 +126,14 @@ def joint_sweep(
         progress: called with 1 after each posture.
     """
     robot = stance.robot
-    kind = robot.model.joints[robot.joint_id(joint)].shortname()
-    unit = "m" if kind.startswith("JointModelP") else "rad"
     now = robot.joint_position(stance.q, joint)
 
     def request(position: float) -> dict[str, Any]:
         return {"joints": {joint: position}, "cost": cost}
 
-    return _sweep(stance, joint, unit, _grid(start, stop, count), now, request, 0, progress)
+    return _sweep(
+        stance, joint, robot.joint_unit(joint), _grid(start, stop, count), now, request, 0, progress
+    )
 
 
 def path_through(
@@ -175,7 +175,7 @@ def path_through(
     tangents = np.zeros((len(stances), stance.robot.model.nv))
     for i, here in enumerate(stances):
         a, b = max(i - 1, 0), min(i + 1, last)
-        # A neighbour that failed is no neighbour.
+        # A posture that failed is not used as a neighbour.
         a, b = (i if a in failures else a), (i if b in failures else b)
         secant = pin.difference(stance.robot.model, stances[a].q, stances[b].q) / max(b - a, 1)
         basis = here.admissible_motions

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +18,14 @@ from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
+
+# Joints that slide along some of their axes, and the unit along or about each.
+_SLIDING = {
+    **dict.fromkeys(("PX", "PY", "PZ", "PrismaticUnaligned"), ("m",)),
+    "Translation": ("m",) * 3,
+    "Planar": ("m", "m", "rad"),
+    "FreeFlyer": ("m",) * 3 + ("rad",) * 3,
+}
 
 # Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
 _BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
@@ -239,6 +248,20 @@ class Robot:
                 "Name a revolute or prismatic joint."
             )
         return int(model_joint.idx_v)
+
+    @cached_property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of the position behind each torque: ``"rad"``, or ``"m"`` if it slides."""
+        units: list[str] = []
+        for joint in list(self.model.joints)[2:]:
+            kind = joint.shortname().removeprefix("JointModel")
+            units += _SLIDING.get(kind, ("rad",) * joint.nv)
+        return tuple(units)
+
+    def joint_unit(self, joint: str) -> Literal["rad", "m"]:
+        """Unit of a one-degree-of-freedom joint's position: ``"rad"``, or ``"m"`` if it slides."""
+        unit = self.torque_units[self.velocity_index(joint) - self.base_nv]
+        return "m" if unit == "m" else "rad"
 
     def joint_position(self, q: Float[np.ndarray, " nq"], joint: str) -> float:
         """Position [rad or m] of a one-degree-of-freedom joint at a configuration."""

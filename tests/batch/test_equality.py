@@ -44,6 +44,7 @@ def test_the_kernel_equals_the_clear_path(case, name):
                 "com_travel": clear.com_travel,
                 "load_share": clear.equilibrium.wrenches[:, 2] / stance.robot.weight,
             }
+            assert np.array_equal(found.tipping_edge[i, j], clear.tipping_edge)
             for what, value in pairs.items():
                 error = largest_error(getattr(found, what)[i, j][None, None], value[None, None])
                 assert error < RELATIVE, (what, i, criterion.name, error)
@@ -53,7 +54,7 @@ def test_margins_are_the_edge_margins(case):
     stance = case("icub")
     found = evaluate_batch(stance, postures(stance, 5), served(stance), gains=False)
     for i, j, k in np.ndindex(found.margin.shape):
-        edge = copsense.edge_margin(stance.contacts[k].polygon, found.cops[i, j, k])
+        edge = copsense.Polygon(stance.contacts[k].polygon).margin(found.cops[i, j, k])
         assert found.margin[i, j, k] == pytest.approx(edge.distance, abs=1e-13)
     assert found.com_gain.size == found.com_travel.size == 0
 

@@ -14,7 +14,7 @@ PLAN = """
 source = "icub"
 soles = { l_sole = [-0.05, 0.1, -0.01, 0.03], r_sole = [-0.05, 0.1, -0.03, 0.01] }
 [postures.straight]
-knees = 0
+knees_deg = 0
 [controllers.one]
 criterion = "minimum-wrench"
 [controllers.wide]
@@ -123,8 +123,8 @@ def test_a_picture_shows_bounds_failures_and_predictions():
     [
         (["icubb"], "icub"),
         (["icub", "--criterion", "best"], "best"),
-        (["icub", "--posture", "sitting"], "own, straight, knees=RAD"),
-        (["icub", "--posture", "knees=a"], "knees=RAD"),
+        (["icub", "--posture", "sitting"], "own, straight, knees=DEG"),
+        (["icub", "--posture", "knees=a"], "an angle, such as 20 (degrees)"),
         (["solo12", "--posture", "straight"], "joints in a plan file"),
         (["icub", "--disturbance", "dance"], "dance"),
         (["icub", "--disturbance", "lean:speed"], "TRIAL[:OPTION=VALUE"),
@@ -132,7 +132,7 @@ def test_a_picture_shows_bounds_failures_and_predictions():
         (["icub", "--disturbance", "lean:side=up"], "up"),
         (["icub", "--disturbance", "lean:kind=3"], "no option of the trial 'lean' named 'kind'"),
         (["icub", "--disturbance", "lean:scores=3"], "Valid: reach, speed, side."),
-        (["icub", "--disturbance", "lean:side=3"], "Give a text"),
+        (["icub", "--disturbance", "lean:side=3"], "expected a text"),
         (["icub", "--disturbance", "delay:parameter=bandwidth"], "named 'parameter'"),
         (["icub", "--disturbance", "delay:step=1e-300"], "finer than any simulation"),
         (["icub", "--contact", "no_sole"], "no_sole"),
@@ -154,29 +154,41 @@ def test_bad_options_are_one_clear_line(options, says):
     ("change", "says"),
     [
         (("[robots.narrow]", "[robot.narrow]"), "robots"),
-        (("[robots.narrow]", "[robots.narrow"), "no TOML"),
-        (("knees = 0", 'knees = "bent"'), "postures.straight"),
-        (("knees = 0", "knee = 0"), "knees"),
+        (("[robots.narrow]", "[robots.narrow"), "not valid TOML"),
+        (("knees_deg = 0", 'knees_deg = "bent"'), "postures.straight"),
+        (
+            ("knees_deg = 0", "knees = 0"),
+            "no field of PostureTable named 'knees'. Did you mean knees_deg",
+        ),
         (("reach = 0.015", "reach = -1"), "reach"),
         (('kind = "falls"', 'kind = "tumbles"'), "tumbles"),
         (("motors = {", "engines = {"), "engines"),
         (("delay = 0.002", "lag = 0.002"), "lag"),
         (("friction = 0.9", "friction = -1"), "friction"),
+        (("friction = 0.9", "friction = 'contct'"), "Did you mean contact? Valid: contact"),
+        (("start = 0.1", "strt = 0.1"), "no field of Push named 'strt'. Did you mean start"),
+        (("force = [0.0, 0.1, 0.0]", "force = [0.0, 0.1]"), "pushes[0].force is not valid"),
         (('controllers = ["one"]', 'controllers = ["two"]'), "two"),
         (('trials = "lean"', 'moves = "lean"'), "moves"),
         (("[-0.05, 0.1, -0.01, 0.03]", "[0.1, -0.05, -0.01, 0.03]"), "x0 < x1"),
         (("reach = 0.015", "scores = 3"), "named 'scores'"),
-        (("reach = 0.015", 'reach = "far"'), "reach is 'far'. Give a number"),
-        (("knees = 0", 'name = "x"'), "Leave it out"),
-        (("knees = 0", "joints_deg = 3"), "joints is 3. Give a table, each a number"),
+        (("reach = 0.015", 'reach = "far"'), "reach is not valid: expected a number"),
+        (("knees_deg = 0", 'name = "x"'), "Leave it out"),
+        (("knees_deg = 0", "joints_deg = 3"), "joints_deg is not valid: expected a table"),
         (("l_sole = [-0.05, 0.1, -0.01, 0.03]", "l_sole = 3"), "soles"),
-        (("soles = {", "contacts = 'l_sole' #"), "contacts is 'l_sole'. Give a list"),
-        (('source = "icub"', "source = 3"), "source is 3. Give a text"),
+        (("soles = {", "contacts = 'l_sole' #"), "contacts is not valid: expected a list"),
+        (('source = "icub"', "source = 3"), "source is not valid: expected a text"),
         (('source = "icub"', 'source = "icup"'), "icup"),
-        (('criterion = "minimum-wrench"', "source = 3"), "source is 3. Give a text"),
-        (("limits = { friction = 0.9, torsion = false }", "limits = 3"), "limits is 3"),
-        (("motors = { delay = 0.002 }", "motors = 3"), "motors is 3"),
-        (("motors = { delay = 0.002 }", 'seed = "x"'), "seed is 'x'. Give a whole number"),
+        (('criterion = "minimum-wrench"', "source = 3"), "source is not valid: expected a text"),
+        (
+            ("limits = { friction = 0.9, torsion = false }", "limits = 3"),
+            "limits is not valid: expected a table",
+        ),
+        (("motors = { delay = 0.002 }", "motors = 3"), "motors is not valid: expected a table"),
+        (
+            ("motors = { delay = 0.002 }", 'seed = "x"'),
+            "seed is not valid: expected a whole number",
+        ),
         (('[[block]]\ntrials = "lean"', "[[block]]\ntrials = []"), "has no trials"),
         (("[trials.lean]", "[trials]\nlean = 3\n[trials.lean2]"), "trials.lean"),
     ],

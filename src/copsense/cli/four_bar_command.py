@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from copsense.cli.options import echo_json
+from copsense.cli.printing import echo_json
 from copsense.errors import InvalidInputError, UnknownNameError
 
 

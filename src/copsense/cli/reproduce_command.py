@@ -7,9 +7,8 @@ import shlex
 import sys
 
 import click
-from tqdm import tqdm
 
-from copsense.cli.options import limits_option, read_limits
+from copsense.cli.limit_options import limits_option, read_limits
 
 
 @click.command(epilog="Example: copsense reproduce --output reproduction")
@@ -52,6 +51,8 @@ def reproduce(
         )
         static = True
     command = f"copsense {shlex.join(sys.argv[1:])}"
+    from tqdm import tqdm
+
     form = "{desc} {n}/{total} [{elapsed}]"
     # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
     with tqdm(total=0, disable=quiet or None, leave=False, bar_format=form) as bar:

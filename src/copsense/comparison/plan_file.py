@@ -4,30 +4,51 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping
-from dataclasses import is_dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_type_hints
 
 from copsense.comparison.case import IDEAL, Case, make_plan
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
-from copsense.comparison.plan_values import as_table, build, check_fields
+from copsense.comparison.plan_values import structure
 from copsense.comparison.trials import Trial, trial_named
-from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
-from copsense.limits import Limits
+from copsense.errors import (
+    CopsenseError,
+    InvalidInputError,
+    MissingExtraError,
+    UnknownNameError,
+)
 from copsense.simulation import Scenario
+
+
+@dataclass(frozen=True)
+class PostureTable:
+    """A posture as a plan file has it, with the unit of each position in its key.
+
+    Attributes:
+        knees_deg: bend of both knees [deg], see `PostureChoice.knees`.
+        width: between the feet [m].
+        joints_deg: joint -> angle [deg].
+        joints_m: prismatic joint -> position [m].
+    """
+
+    knees_deg: float | None = None
+    width: float | None = None
+    joints_deg: Mapping[str, float] = field(default_factory=dict)
+    joints_m: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_plan(path: str | Path) -> tuple[Case, ...]:
     """A plan from a TOML file.
 
     Tables ``[robots.NAME]``, ``[postures.NAME]``, ``[controllers.NAME]``, ``[conditions.NAME]`` and
-    ``[trials.NAME]`` hold the fields of `RobotChoice`, `PostureChoice` (joints as ``joints_deg``),
-    `ControllerChoice`, a scenario and a trial (with its ``kind``). The plan is their product, or
-    that of each ``[[block]]``, which lists names: ``robots = ["icub"]``.
+    ``[trials.NAME]`` hold the fields of `RobotChoice`, `PostureTable`, `ControllerChoice`, a
+    scenario and a trial (with its ``kind``). The plan is their product, or that of each
+    ``[[block]]``, which lists names: ``robots = ["icub"]``.
 
     Raises:
-        InvalidInputError: no such file, no TOML, or values that mean nothing.
+        InvalidInputError: no such file, not TOML, or a value that is not valid.
         UnknownNameError: a table, field or name that is not known.
     """
     path = Path(path)
@@ -38,34 +59,13 @@ def read_plan(path: str | Path) -> tuple[Case, ...]:
             f"the plan {path} cannot be read: {error.strerror}. Give the path of a TOML file."
         ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInputError(f"the plan {path} is no TOML: {error}. Mend this place.") from None
-    readers = {
-        "robots": _robot,
-        "postures": _posture,
-        "controllers": _controller,
-        "conditions": _conditions,
-        "trials": _trial,
-    }
+        raise InvalidInputError(
+            f"the plan {path} is not valid TOML: {error}. Correct this line."
+        ) from None
     for name in content:
-        if name not in (*readers, "block"):
-            raise UnknownNameError(f"table in {path.name}", name, (*readers, "block"))
-    known: dict[str, dict[str, Any]] = {}
-    for kind, read in readers.items():
-        tables = content.get(kind, {})
-        if not isinstance(tables, Mapping):
-            raise InvalidInputError(f"{kind} in {path.name} is no table. Write [{kind}.NAME].")
-        known[kind] = {}
-        for name, table in tables.items():
-            if not isinstance(table, Mapping):
-                raise InvalidInputError(f"{kind}.{name} is no table. Write [{kind}.{name}].")
-            try:
-                if "name" in table:
-                    raise InvalidInputError("a name is that of its table. Leave it out.")
-                known[kind][name] = read(name, dict(table))
-            except UnknownNameError:
-                raise
-            except (CopsenseError, TypeError, ValueError) as error:
-                raise InvalidInputError(f"[{kind}.{name}] in {path.name}: {error}") from None
+        if name not in (*_READERS, "block"):
+            raise UnknownNameError(f"table in {path.name}", name, (*_READERS, "block"))
+    known = {kind: _read_tables(kind, content.get(kind, {}), path.name) for kind in _READERS}
     known["postures"] = known["postures"] or {"own": PostureChoice()}
     known["conditions"] = known["conditions"] or {"ideal": IDEAL}
     for kind in ("robots", "controllers", "trials"):
@@ -74,8 +74,31 @@ def read_plan(path: str | Path) -> tuple[Case, ...]:
     blocks = content.get("block", [{}])
     cases: list[Case] = []
     for block in blocks if isinstance(blocks, list) else [blocks]:
-        cases += _block(as_table(block, f"a [[block]] in {path.name}"), known, path.name)
+        block = structure(block, dict[str, Any], f"a [[block]] in {path.name}")
+        cases += _block(block, known, path.name)
     return tuple(cases)
+
+
+def _read_tables(kind: str, tables: object, where: str) -> dict[str, Any]:
+    """The tables ``[kind.NAME]`` as values, by their names."""
+    if not isinstance(tables, Mapping):
+        raise InvalidInputError(f"{kind} in {where} is not a table. Write [{kind}.NAME].")
+    found = {}
+    for name, table in tables.items():
+        if not isinstance(table, Mapping):
+            raise InvalidInputError(f"{kind}.{name} is not a table. Write [{kind}.{name}].")
+        if "name" in table:
+            raise InvalidInputError(
+                f"[{kind}.{name}] in {where} has a key 'name', which its heading gives. "
+                "Leave it out."
+            )
+        try:
+            found[name] = _READERS[kind](name, dict(table))
+        except (UnknownNameError, MissingExtraError):
+            raise
+        except (CopsenseError, TypeError, ValueError) as error:
+            raise InvalidInputError(f"[{kind}.{name}] in {where}: {error}") from None
+    return found
 
 
 def _block(
@@ -103,52 +126,48 @@ def _block(
 
 
 def _robot(name: str, table: dict[str, Any]) -> RobotChoice:
-    table.setdefault("source", name)
-    if "soles" in table:
-        check_fields(RobotChoice, {"soles": table["soles"]})
-        table["soles"] = {frame: tuple(sole) for frame, sole in table["soles"].items()}
-    return build(RobotChoice, table | {"name": name})
+    return structure({"source": name} | table | {"name": name}, RobotChoice)
 
 
 def _posture(name: str, table: dict[str, Any]) -> PostureChoice:
-    if "joints_deg" in table:
-        degrees = table.pop("joints_deg")
-        check_fields(PostureChoice, {"joints": degrees})
-        table["joints"] = {joint: math.radians(angle) for joint, angle in degrees.items()}
-    return build(PostureChoice, table | {"name": name})
+    found: PostureTable = structure(table, PostureTable)
+    joints = {joint: math.radians(angle) for joint, angle in found.joints_deg.items()}
+    return PostureChoice(
+        name,
+        None if found.knees_deg is None else math.radians(found.knees_deg),
+        found.width,
+        (joints | dict(found.joints_m)) or None,
+    )
 
 
 def _controller(name: str, table: dict[str, Any]) -> ControllerChoice:
-    if "limits" in table:
+    limits = table.get("limits")
+    if isinstance(limits, Mapping):
         # TOML has no null: false switches a limit off.
-        values = {
-            key: None if v is False else v for key, v in as_table(table["limits"], "limits").items()
-        }
-        table["limits"] = build(Limits, values)
-    return build(ControllerChoice, table | {"name": name})
+        table["limits"] = {key: None if v is False else v for key, v in limits.items()}
+    return structure(table | {"name": name}, ControllerChoice)
 
 
 def _conditions(name: str, table: dict[str, Any]) -> Conditions:
     hints = get_type_hints(Scenario)
-    values = {}
-    for field, value in table.items():
-        kinds = [k for k in (hints.get(field), *_parts(hints.get(field))) if is_dataclass(k)]
-        if kinds and isinstance(value, Mapping):
-            value = build(kinds[0], dict(value))  # type: ignore[arg-type]
-        elif kinds and isinstance(value, list):
-            value = tuple(build(kinds[0], as_table(part, field)) for part in value)  # type: ignore[arg-type]
-        values[field] = value
-    check_fields(Scenario, values)
-    return Conditions(name, values)
+    # Conditions name the fields that a scenario lacks; the others are of its fields' types.
+    return Conditions(
+        name,
+        {
+            key: structure(value, hints[key], key) if key in hints else value
+            for key, value in table.items()
+        },
+    )
 
 
 def _trial(name: str, table: dict[str, Any]) -> Trial:
     return trial_named(str(table.pop("kind", name)), **table)
 
 
-def _parts(hint: Any) -> list[Any]:
-    """What a type is made of: the X of X | None and of tuple[X, ...]."""
-    found = []
-    for part in get_args(hint):
-        found += [part, *_parts(part)]
-    return found
+_READERS: dict[str, Callable[[str, dict[str, Any]], Any]] = {
+    "robots": _robot,
+    "postures": _posture,
+    "controllers": _controller,
+    "conditions": _conditions,
+    "trials": _trial,
+}

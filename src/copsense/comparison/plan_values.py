@@ -1,97 +1,91 @@
-"""Building: values from the tables of a plan file, each field of the type that it says."""
+"""Values of a plan file: TOML tables become the package's own types, or one clear error."""
 
 from __future__ import annotations
 
-import types
+import re
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from dataclasses import fields, is_dataclass
+from typing import Any, get_args, get_type_hints
 
-from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.errors import InvalidInputError, MissingExtraError, UnknownNameError
 
-C = TypeVar("C")
+# What msgspec calls the types that TOML can hold -> what a reader of the file calls them.
 _WORDS = {
-    bool: "true or false",
-    float: "a number",
-    int: "a whole number",
-    str: "a text",
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "str": "a text",
+    "array": "a list",
+    "object": "a table",
 }
 
 
-def build(cls: type[C], values: Mapping[str, Any]) -> C:
-    """A dataclass from a table of its fields.
+def structure(value: object, kind: Any, name: str = "") -> Any:
+    """A value of a type, from what TOML can hold; nothing is coerced but whole numbers to floats.
+
+    Args:
+        value: a table, list, number, text or truth value.
+        kind: the type wanted: a dataclass, or the type of a dataclass's field.
+        name: what messages call the value; default nothing, as for a table of its own.
 
     Raises:
-        UnknownNameError: a field that it lacks.
-        InvalidInputError: a value of another type than the field's.
+        MissingExtraError: msgspec is not installed.
+        UnknownNameError: a table has a key for which its dataclass has no field.
+        InvalidInputError: a value is of another type or is rejected by its dataclass; the message
+            names the field.
     """
-    known = [f.name for f in fields(cls) if f.init]  # type: ignore[arg-type]
-    for name in values:
+    try:
+        import msgspec
+    except ImportError:
+        raise MissingExtraError("msgspec", "sim", "reading a plan") from None
+    _check_names(value, kind)
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        if isinstance(error.__cause__, InvalidInputError):  # from the dataclass itself
+            raise error.__cause__ from None
+        message, _, path = str(error).partition(" - at `$")
+        where = (name + path.rstrip("`")).lstrip(".") or "the value"
+        if message.startswith("Invalid enum value"):
+            given = re.findall(r"'([^']*)'", message)[-1]
+            raise UnknownNameError(where, given, _names_at(kind, path)) from None
+        raise InvalidInputError(f"{where} is not valid: {_plain(message)}.") from None
+
+
+def _check_names(value: object, kind: Any) -> None:
+    """Reject keys that no field is called; of a union's types at most one is a dataclass."""
+    if isinstance(value, list | tuple):
+        for part in value:
+            _check_names(part, kind)
+    table = next((k for k in (kind, *_parts(kind)) if is_dataclass(k)), None)
+    if table is None or not isinstance(value, Mapping):
+        return
+    hints, known = get_type_hints(table), [f.name for f in fields(table) if f.init]
+    for name, part in value.items():
         if name not in known:
-            raise UnknownNameError(f"field of {cls.__name__}", name, known)
-    check_fields(cls, values)
-    # TOML has lists where values have tuples.
-    return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in values.items()})
+            raise UnknownNameError(f"field of {table.__name__}", name, known)  # type: ignore[union-attr]
+        _check_names(part, hints[name])
 
 
-def check_fields(cls: type, values: Mapping[str, Any]) -> None:
-    """Refuse values that are not of the types that a class gives its fields.
-
-    Raises:
-        InvalidInputError: the message names the field and what it takes.
-    """
-    hints = get_type_hints(cls)
-    for name, value in values.items():
-        if name in hints and not _fits(value, hints[name]):
-            words = dict.fromkeys(_told(hints[name]))
-            raise InvalidInputError(f"{name} is {value!r}. Give {' or '.join(words)}.")
+def _parts(kind: Any) -> list[Any]:
+    """What a type is made of: the X of X | None and of tuple[X, ...]."""
+    return [inner for part in get_args(kind) for inner in (part, *_parts(part))]
 
 
-def as_table(value: object, what: str) -> dict[str, Any]:
-    """A table of a plan file.
-
-    Raises:
-        InvalidInputError: it is none.
-    """
-    if not isinstance(value, Mapping):
-        raise InvalidInputError(f"{what} is {value!r}. Give a table, {{ NAME = VALUE }}.")
-    return dict(value)
+def _names_at(kind: Any, path: str) -> list[str]:
+    """The names that a field accepts, of a path such as ``.limits.friction``."""
+    for field in re.findall(r"\.(\w+)", path):
+        table = next((k for k in (kind, *_parts(kind)) if is_dataclass(k)), None)
+        kind = get_type_hints(table)[field] if table else kind
+    return [part for part in _parts(kind) if isinstance(part, str)]
 
 
-def _fits(value: Any, hint: Any) -> bool:
-    origin, parts = get_origin(hint), get_args(hint)
-    if origin in (Union, types.UnionType):
-        return any(_fits(value, part) for part in parts)
-    if origin is Literal:
-        return any(type(value) is type(part) and value == part for part in parts)
-    if origin is tuple:
-        if not isinstance(value, list | tuple):
-            return False
-        if parts[-1] is Ellipsis:
-            return all(_fits(part, parts[0]) for part in value)
-        return len(value) == len(parts) and all(map(_fits, value, parts))
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return isinstance(value, Mapping) and all(_fits(v, parts[1]) for v in value.values())
-    if hint in (int, float):
-        return isinstance(value, int if hint is int else int | float) and not isinstance(
-            value, bool
-        )
-    return not isinstance(hint, type) or isinstance(value, hint)
+def _plain(message: str) -> str:
+    """A message of msgspec in the words of a plan file."""
 
+    def words(match: re.Match[str]) -> str:
+        kinds = [_WORDS.get(kind, f"`{kind}`") for kind in match[1].split(" | ") if kind != "null"]
+        return " or ".join(dict.fromkeys(kinds))
 
-def _told(hint: Any) -> list[str]:
-    """What a type takes, in words; nothing of what a file cannot write."""
-    origin, parts = get_origin(hint), get_args(hint)
-    if origin in (Union, types.UnionType):
-        return [word for part in parts for word in _told(part)]
-    if origin is Literal:
-        return [repr(part) for part in parts]
-    if origin is tuple:
-        inner = " and ".join(dict.fromkeys(w for part in parts for w in _told(part)))
-        many = "" if parts[-1] is Ellipsis else f" of {len(parts)}"
-        return [f"a list{many}" + (f", each {inner}" if inner else "")]
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return [f"a table, each {' or '.join(_told(parts[1]))}"]
-    if hint in (types.NoneType, Ellipsis):
-        return []
-    return [_WORDS.get(hint, f"a table of {getattr(hint, '__name__', hint)}")]
+    text = re.sub(r"`([^`]+)`", words, message)
+    return text[:1].lower() + text[1:]

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from copsense.arrays import finite_number
 from copsense.comparison.bisection import count_steps
-from copsense.comparison.plan_values import check_fields
+from copsense.comparison.plan_values import structure
 from copsense.errors import InvalidInputError, UnknownNameError
 
 
@@ -276,10 +276,9 @@ def trial_named(kind: str, /, **options: object) -> Trial:
         raise UnknownNameError("disturbance", kind, KINDS)
     cls = KINDS[kind]
     known = [field.name for field in fields(cls) if field.name != "parameter"]  # the kind says it
-    check_fields(cls, options)
     for name in options:
         if name not in known:
             raise UnknownNameError(f"option of the trial {kind!r}", name, known)
     if cls is Breaking:
         options = {"parameter": kind} | options
-    return cls(**options)  # type: ignore[arg-type]
+    return structure(options, cls)

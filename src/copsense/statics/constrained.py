@@ -42,7 +42,7 @@ from copsense.statics.program import NoPointError, Program
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
 _RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
-_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that is no approach
+_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that does not count
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
 
 
@@ -266,7 +266,7 @@ class _Problem:
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
         # Row of the normal force under a centre of pressure; -1 for any other limit.
         under = [
-            stance.rows[k].start + stance.contacts[k].components.index(2) if kind == "cop" else -1
+            stance.rows[k].start + stance.contacts[k].normal_row if kind == "cop" else -1
             for k, kind in zip(rows.contacts, rows.kinds, strict=True)
         ]
         self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)

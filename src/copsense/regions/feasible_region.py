@@ -10,9 +10,9 @@ from copsense.arrays import finite_number
 from copsense.errors import InfeasibleError, InvalidInputError
 from copsense.limits import Limits, limit_rows
 from copsense.load_problem import LoadProblem
-from copsense.regions.balance import com_axes, gravity_slope
-from copsense.regions.polygon import MERGE, Point, refine
-from copsense.regions.region import BOX, ComRegion, region_between
+from copsense.regions.refinement import Point, refine
+from copsense.regions.region import BOX, MERGE, ComRegion, region_between
+from copsense.regions.weight_line import com_axes, gravity_slope
 from copsense.stance import Stance
 from copsense.statics.qp import least_relaxation, linear_minimum
 

@@ -7,14 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.options import (
-    echo_json,
-    progress_bar,
-    read_limits,
-    read_range,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.quantities import read_range
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -24,8 +20,9 @@ _SAME = 1e-6  # relative: less is no gain
 
 
 @click.command(
-    epilog="Example: copsense design icub --family joints --limits friction=0.33,torque=model "
-    "--plot design.png"
+    epilog="\b\nExamples:\n"
+    "  copsense design icub --family length --com-y -0.08:0.08:17\n"
+    "  copsense design icub --family joints --limits friction=0.33,torque=model --plot design.png"
 )
 @stance_options
 @click.option(
@@ -86,7 +83,7 @@ def design(
     if picture is not None:
         check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
     within = read_limits(limits) or Limits()
-    start, stop, count = read_range(com_y)
+    start, stop, count = read_range(com_y, "m")
     stance = read_stance(robot, **options)
     known = families(stance)
     if family not in known:
@@ -115,7 +112,8 @@ def design(
     else:
         _print(stance.robot.name, found)
         if picture is not None:
-            click.echo(f"\ndrawn: {picture}")
+            click.echo()
+            echo_written(picture)
 
 
 def _print(robot: str, found: Design) -> None:

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    progress_bar,
-    read_criteria,
-    read_limits,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, progress_bar
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -294,7 +289,9 @@ def _print(summary: MapSummary, plot: str | None) -> None:
             middle = row.travel_percentiles[50.0]
             click.echo(
                 f"    CoM travel: worst {worst.value * 1e3:+.1f} mm at "
-                f"{_place(worst.coordinates, units)}; median {middle * 1e3:+.1f} mm"
+                f"{_place(worst.coordinates, units)}"
+                + (f" (edge {worst.tipping_edge} of {worst.contact})" if worst.contact else "")
+                + f"; median {middle * 1e3:+.1f} mm"
             )
         if row.worst_gain:
             gain = row.worst_gain[0]

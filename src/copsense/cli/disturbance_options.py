@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.options import read_assignments
+from copsense.cli.option_lists import F, with_options
+from copsense.cli.quantities import read_assignments
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.controllers import Signal
     from copsense.simulation import FrictionChange, Push
 
-F = TypeVar("F", bound=Callable[..., Any])
 
 REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m/s]"
 
@@ -81,9 +80,7 @@ def disturbance_options(command: F) -> F:
             "--seed", type=int, default=0, show_default=True, help="Of everything random."
         ),
     ]
-    for option in reversed(options):
-        command = option(command)
-    return command
+    return with_options(options, command)
 
 
 def read_disturbances(options: dict[str, Any]) -> dict[str, Any]:

@@ -5,22 +5,15 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    limits_option,
-    progress_bar,
-    read_criteria,
-    read_limits,
-    read_range,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.quantities import read_range
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -31,8 +24,9 @@ _OVER_LIMIT = 1e-6  # rad: less is rounding
 
 
 @click.command(
-    epilog="Example: copsense sweep icub --com-y -0.07:0.07:201 --criterion minimum-wrench "
-    "--criterion minimum-torque --output icub.nc"
+    epilog="\b\nExamples:\n"
+    "  copsense sweep icub --com-y -0.07:0.07:201 --output icub.nc\n"
+    "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv"
 )
 @stance_options
 @criterion_options
@@ -41,7 +35,11 @@ _OVER_LIMIT = 1e-6  # rad: less is rounding
     metavar="START:STOP:COUNT",
     help="Sweep the CoM sideways, world y [m]; CoM x held over the contacts' middle.",
 )
-@click.option("--joint", metavar="NAME=START:STOP:COUNT", help="Sweep a joint [deg].")
+@click.option(
+    "--joint",
+    metavar="NAME=START:STOP:COUNT",
+    help="Sweep a joint: degrees, or metres for a prismatic joint, or with units (0mm:200mm:3).",
+)
 @click.option(
     "--configurations",
     type=click.Path(),
@@ -81,7 +79,7 @@ def sweep(
     if sum(what is not None for what in (com_y, joint, configurations)) != 1:
         raise InvalidInputError(
             "say what to sweep, one of: --com-y START:STOP:COUNT [m], "
-            "--joint NAME=START:STOP:COUNT [deg], --configurations FILE."
+            "--joint NAME=START:STOP:COUNT, --configurations FILE."
         )
     if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
@@ -101,12 +99,16 @@ def sweep(
         echo_json(summary)
     else:
         _print(summary)
+    model = path.stances[0].robot
+    units = dict(zip(model.torque_names, model.torque_units, strict=True))
     beyond = dataset["joint_limit_excess"].max("posture")
     for name in beyond["joint"].values[beyond.values > _OVER_LIMIT]:
         count = int((dataset["joint_limit_excess"].sel(joint=name) > _OVER_LIMIT).sum())
-        excess = math.degrees(float(beyond.sel(joint=name)))
+        unit = units[str(name)]
+        excess = float(beyond.sel(joint=name)) * (math.degrees(1.0) if unit == "rad" else 1e3)
         click.echo(
-            f"note: {name} is beyond its limit at {count} postures, by up to {excess:.1f} deg",
+            f"note: {name} is beyond its limit at {count} postures, by up to {excess:.1f} "
+            f"{'deg' if unit == 'rad' else 'mm'}",
             err=True,
         )
     for posture, criterion, reason in failures[:5]:
@@ -114,37 +116,6 @@ def sweep(
     if len(failures) > 5:
         click.echo(f"failed: {len(failures) - 5} more; see the variable 'reason'", err=True)
     click.get_current_context().exit(1 if failures else 0)
-
-
-@click.command(
-    epilog="Examples: copsense plot icub.nc --output icub.png; "
-    "copsense plot icub.nc --limits friction=0.3,torque=model"
-)
-@click.argument("file", type=click.Path())
-@click.option(
-    "--output",
-    type=click.Path(),
-    help="Picture to write: .png, .svg or .pdf. Default: FILE with .png.",
-)
-@limits_option
-@click.option("--force", is_flag=True, help="Overwrite the output.")
-def plot(file: str, output: str | None, limits: str | None, force: bool) -> None:
-    """Draw a sweep written by `copsense sweep`: soles and CoPs, margins, load, CoM travel.
-
-    With limits, or of a sweep within limits, the margins to them are drawn too, and where each
-    criterion meets its first one: to the recorded wrenches, whatever the sweep was evaluated with.
-    """
-    from copsense.plots import plot_results, save_figure
-    from copsense.recorded import with_limit_margins
-    from copsense.storage import check_output, load_results
-
-    dataset, chosen = load_results(file), read_limits(limits)
-    if chosen is not None:
-        dataset = with_limit_margins(dataset, chosen)
-    path = Path(file).with_suffix(".png") if output is None else Path(output)
-    check_output(path, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
-    save_figure(plot_results(dataset), path, overwrite=force)
-    click.echo(str(path))
 
 
 def _read_path(
@@ -157,13 +128,14 @@ def _read_path(
     if configurations is not None:
         rows = load_configurations(configurations)
         return path_through(stance.at(rows[0]), rows, strict=False)
-    name, _, text = ("", "", com_y) if com_y is not None else str(joint).partition("=")
-    start, stop, count = read_range(text)
-    with progress_bar(max(count, 0), "postures") as update:
-        if com_y is not None:
+    if com_y is not None:
+        start, stop, count = read_range(com_y, "m")
+        with progress_bar(max(count, 0), "postures") as update:
             return lateral_sweep(stance, start, stop, count, progress=update)
-        ends = math.radians(start), math.radians(stop)
-        return joint_sweep(stance, name, *ends, count, progress=update)
+    name, _, text = str(joint).partition("=")
+    start, stop, count = read_range(text, stance.robot.joint_unit(name))
+    with progress_bar(max(count, 0), "postures") as update:
+        return joint_sweep(stance, name, start, stop, count, progress=update)
 
 
 def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str, Any]:
@@ -240,4 +212,4 @@ def _print(summary: dict[str, Any]) -> None:
             err=True,
         )
     if summary["output"]:
-        click.echo(f"written: {summary['output']}")
+        echo_written(summary["output"])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from copsense.cli.options import read_assignments
+from copsense.cli.option_lists import F, with_options
+from copsense.cli.quantities import read_assignments
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -18,12 +18,10 @@ if TYPE_CHECKING:
     from copsense.limits import Limits
     from copsense.stance import Stance
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 
 def controller_options(command: F) -> F:
-    """Add --gains, --gain and --controller."""
-    for option in (
+    """Which controller balances the robot, and how stiff it is."""
+    options = [
         click.option(
             "--controller",
             metavar="MODULE:NAME",
@@ -46,9 +44,8 @@ def controller_options(command: F) -> F:
             show_default=True,
             help="Gains: stiff, or soft ones like those the authors published.",
         ),
-    ):
-        command = option(command)
-    return command
+    ]
+    return with_options(options[::-1], command)
 
 
 def read_controller(

@@ -6,11 +6,11 @@ from typing import Any
 
 import click
 
-from copsense.cli.options import echo_json
+from copsense.cli.printing import echo_json
 from copsense.errors import CopsenseError
 
 
-@click.command(epilog="Example: copsense robots --json")
+@click.command(epilog="\b\nExamples:\n  copsense robots\n  copsense robots --json")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, with every joint's name.")
 def robots(as_json: bool) -> None:
     """List the robots known by name: joints, mass and contact frames.

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.limits import (
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.limit_text import (
     add_limits,
     add_regions,
     limit_verdict,
@@ -16,15 +18,9 @@ from copsense.cli.limits import (
     print_limits,
     print_regions,
 )
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    read_assignments,
-    read_criteria,
-    read_limits,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.printing import echo_json
+from copsense.cli.quantities import read_positions
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -95,8 +91,8 @@ def analyse(
             "--limits friction=0.33,torque=model."
         )
     chosen = read_criteria(criteria, characteristic_length)
-    held = {joint: math.radians(deg) for joint, deg in read_assignments(joints).items()}
     home = read_stance(robot, **options)
+    held = read_positions(joints, home.robot)
     if along is not None:
         home.robot.velocity_index(along)
     planar = home.robot.base_nv != 6
@@ -117,8 +113,13 @@ def analyse(
     answer.setdefault("notes", []).extend(sole_notes(stance))
     answer["notes"] += [
         f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
-        for joint, excess in zip(
-            stance.robot.torque_names, stance.joint_limit_excess.tolist(), strict=True
+        if unit == "rad"
+        else f"{joint} is {excess * 1e3:.1f} mm beyond its limit."
+        for joint, unit, excess in zip(
+            stance.robot.torque_names,
+            stance.robot.torque_units,
+            stance.joint_limit_excess.tolist(),
+            strict=True,
         )
         if excess > 1e-6
     ]
@@ -131,14 +132,14 @@ def analyse(
     if as_json:
         echo_json(answer)
     else:
-        _print(answer, along)
+        _print(answer, along, home.robot.joint_unit(along) if along else "rad")
 
 
 def _answer(
     stance: Stance, results: dict[str, CopSensitivity], tangent: Any, along: str | None
 ) -> dict[str, Any]:
     """The analysis as plain data."""
-    from copsense.cop import edge_margin, total_center_of_pressure
+    from copsense.cop import total_center_of_pressure
 
     robot = stance.robot
     criteria: dict[str, Any] = {}
@@ -160,8 +161,8 @@ def _answer(
             }
             if joint_slope is not None:
                 row[f"cop_per_{along}"] = joint_slope[k]
-            if contact.polygon is not None:
-                margin = edge_margin(contact.polygon, result.cop[k])
+            if contact.sole:
+                margin = contact.sole.margin(result.cop[k])
                 row |= {"margin": margin.distance, "margin_side": margin.side}
             per_contact[contact.name] = row
         criteria[name] = {
@@ -185,7 +186,8 @@ def _answer(
     }
 
 
-def _print(answer: dict[str, Any], along: str | None) -> None:
+def _print(answer: dict[str, Any], along: str | None, unit: str) -> None:
+    per, scale = ("mm/mm", 1.0) if unit == "m" else ("mm/deg", 1e3 * math.pi / 180)
     com = ", ".join(f"{round(value, 4) + 0.0:+.4f}" for value in answer["com"])
     click.echo(f"{answer['robot']}: {answer['mass']:.2f} kg, CoM ({com}) m, world axes")
     click.echo(
@@ -198,7 +200,7 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
         )
         head = f"  {'contact':{width}}   load  CoP x, y [mm]     margin [mm]          "
         head += "dCoP_y/dCoM_y  worst gain  CoM travel [mm]: tips  unloads"
-        click.echo(head + (f"  dCoP_y/d{along} [mm/deg]" if along else ""))
+        click.echo(head + (f"  dCoP_y/d{along} [{per}]" if along else ""))
         clipped = presses(row)
         for contact, c in row["contacts"].items():
             margin = "-"
@@ -219,7 +221,7 @@ def _print(answer: dict[str, Any], along: str | None) -> None:
                 f"  {c['worst_case_gain']:10.3f}  {tips:>21}  {unloads:>7}"
             )
             if along:
-                line += f"  {c[f'cop_per_{along}'][1] * 1e3 * math.pi / 180:12.3f}"
+                line += f"  {c[f'cop_per_{along}'][1] * scale:12.3f}"
             click.echo(line + ("  PULLING" if c["pulling"] else ""))
         if "limit_travel" in row:
             click.echo(

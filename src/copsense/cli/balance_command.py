@@ -12,23 +12,18 @@ from dataclasses import replace
 from typing import Any
 
 import click
-from tqdm import tqdm
 
-from copsense.cli.controller import controller_options, read_controller
-from copsense.cli.disturbances import (
+from copsense.cli.controller_options import controller_options, read_controller
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.disturbance_options import (
     REFERENCES,
     disturbance_options,
     read_disturbances,
     read_signal,
 )
-from copsense.cli.options import (
-    criterion_options,
-    echo_json,
-    read_criteria,
-    read_limits,
-    read_stance,
-    stance_options,
-)
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
 
 
@@ -147,7 +142,7 @@ def balance(
     path = lateral_reference(stance, course)
     total = round(scenario.duration / scenario.control_period)
     with (
-        tqdm(total=total, desc="balancing", unit="step", disable=None, leave=False) as bar,
+        progress_bar(total, "balancing", "step") as update,
         _interrupts() as stop,
     ):
         recording = rollout(
@@ -155,7 +150,7 @@ def balance(
             law,
             replace(scenario, reference=path),
             until=until,
-            progress=bar.update,
+            progress=update,
             stop=stop,
         )
     if controller is None or criteria:  # of a user's own law the analysis knows nothing
@@ -170,13 +165,14 @@ def balance(
     if video is not None:
         from copsense.simulation.video import write_video
 
-        with tqdm(desc="filming", unit="frame", disable=None, leave=False) as bar:
-            write_video(stance, recording, video, overwrite=force, progress=bar.update)
+        with progress_bar(None, "filming", "frame") as update:
+            write_video(stance, recording, video, overwrite=force, progress=update)
     summary = _summary(recording)
     if as_json:
         echo_json(summary)
     else:
-        _print(summary, [path for path in (output, picture, video) if path])
+        _print(summary)
+        echo_written(output, picture, video)
     codes = {"completed": 0, "stopped": 130}
     click.get_current_context().exit(codes.get(summary["end"]["kind"], 1))
 
@@ -240,7 +236,7 @@ def _summary(recording: Any) -> dict[str, Any]:
     }
 
 
-def _print(summary: dict[str, Any], written: list[str]) -> None:
+def _print(summary: dict[str, Any]) -> None:
     end, tip, static = summary["end"], summary["first_tip"], summary["static_prediction"]
     through = tip and end["kind"] == "completed"
     click.echo(
@@ -269,5 +265,3 @@ def _print(summary: dict[str, Any], written: list[str]) -> None:
             f"  static prediction: {static['contact']} {static['how']} at "
             f"{static['excursion'] * 1e3:.1f} mm"
         )
-    for path in written:
-        click.echo(f"written: {path}")
