@@ -215,8 +215,8 @@ def failing(q):
         (wrong_shape, "shape (3,)"),
         (nan, "not finite at index 0, 0"),
         (ragged, "not an array of numbers"),
-        (nothing, "law 'nothing'"),
-        (failing, "raised KeyError: 'gain'. Mend it"),
+        (nothing, "policy 'nothing'"),
+        (failing, "raised KeyError: 'gain'. Fix it"),
     ],
 )
 def test_a_law_that_answers_wrongly_is_named_with_what_was_wrong(icub, law, said):
