@@ -13,6 +13,7 @@ from typing import Any
 
 import pandas as pd
 
+from copsense import provenance
 from copsense.comparison.case import Case
 from copsense.comparison.score import Score
 from copsense.comparison.score_kinds import SCORES
@@ -112,20 +113,10 @@ def differences(table: pd.DataFrame, cases: Sequence[Case]) -> list[str]:
             old = json.loads(row["parameters"])
         except ValueError:
             old = {}
-        for name, (then, now) in _unlike(old, case.parameters).items():
-            found[f"{name} was {then}, is now {now}"] = None
+        for change in provenance.differences(old, case.parameters):
+            then, now = json.dumps(change.stored), json.dumps(change.asked)
+            found[f"{change.where} was {then}, is now {now}"] = None
     return list(found)
-
-
-def _unlike(old: Any, new: Any, name: str = "") -> dict[str, tuple[str, str]]:
-    """Leaves in which two trees of plain data differ."""
-    if isinstance(old, Mapping) and isinstance(new, Mapping):
-        found: dict[str, tuple[str, str]] = {}
-        for part in {**old, **new}:
-            below = f"{name}.{part}" if name else str(part)
-            found |= _unlike(old.get(part), new.get(part), below)
-        return found
-    return {} if old == new else {name: (json.dumps(old), json.dumps(new))}
 
 
 def _written(value: object) -> object:
