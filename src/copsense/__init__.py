@@ -63,6 +63,7 @@ if TYPE_CHECKING:
         cop_sensitivity,
         finite_difference_sensitivity,
     )
+    from copsense.simulation import balance
     from copsense.sole import Sole, read_sole
     from copsense.stance import Stance
     from copsense.statics import (
@@ -104,6 +105,7 @@ __all__ = [
     "WrenchTerm",
     "__version__",
     "analyse",
+    "balance",
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
@@ -244,6 +246,7 @@ _HOMES = {
         "cop_sensitivity",
         "finite_difference_sensitivity",
     ),
+    "copsense.simulation": ("balance",),
     "copsense.sole": (
         "Sole",
         "read_sole",
