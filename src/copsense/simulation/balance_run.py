@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from copsense.controllers import (
     STIFF,
@@ -21,14 +21,12 @@ from copsense.controllers import (
 from copsense.criterion import Criterion, minimum_torque
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
+from copsense.simulation.closed_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
-from copsense.simulation.rollout import rollout
+from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.stance import Stance
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 
 def balance(
@@ -43,7 +41,7 @@ def balance(
     wrenches: Literal["contacts", "sensors"] = "contacts",
     progress: Callable[[int], object] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> xr.Dataset:
+) -> Recording:
     """Balance a robot in MuJoCo, and record what happened beside the static prediction.
 
     What ``copsense balance`` runs, in one call.
