@@ -27,7 +27,7 @@ def test_differences_say_where_and_rounding_is_none():
     assert differences(one, {"a": [1.0 + 1e-12, {"b": 2.0}], "c": "x"}) == []
     found = differences(one, {"a": [1.0, {"b": 3.0}], "c": "y", "d": None})
     assert [d.where for d in found] == ["a[1].b", "c"]
-    assert worded(found) == 'a[1].b is 2.0 there, 3.0 here; c is "x" there, "y" here'
+    assert worded(found) == 'a[1].b is 2 there, 3 here; c is "x" there, "y" here'
     assert worded(found * 4).endswith(", and 3 more")
     assert digest(one) != digest(found[0].asked)
 

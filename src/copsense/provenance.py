@@ -163,6 +163,8 @@ def _short(value: Any) -> str:
         and all(isinstance(v, dict) and "name" in v for v in value)
     ):
         value = [v["name"] for v in value]
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
