@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
     from copsense.recorded import with_limit_margins
-    from copsense.regions import ComRegion, com_region, criterion_region
+    from copsense.regions import ComRegion, ComRegions, com_region, com_regions, criterion_region
     from copsense.robot import Robot
     from copsense.robots import (
         PRESETS,
@@ -78,6 +78,7 @@ __all__ = [
     "PRESETS",
     "Axis",
     "ComRegion",
+    "ComRegions",
     "ConstrainedEquilibrium",
     "Contact",
     "CopSensitivity",
@@ -105,6 +106,7 @@ __all__ = [
     "check_sensitivity",
     "com_projection",
     "com_region",
+    "com_regions",
     "contact_cops",
     "cop_sensitivity",
     "criterion_named",
@@ -219,7 +221,9 @@ _HOMES = {
     "copsense.recorded": ("with_limit_margins",),
     "copsense.regions": (
         "ComRegion",
+        "ComRegions",
         "com_region",
+        "com_regions",
         "criterion_region",
     ),
     "copsense.robot": ("Robot",),

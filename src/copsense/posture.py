@@ -202,10 +202,9 @@ def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
     """1 for every velocity between a contact and the base, 0 elsewhere (base: 0)."""
     mask = np.zeros(stance.robot.model.nv)
     for contact in stance.contacts:
-        for joint in stance.robot.model.supports[stance.robot.frame(contact.frame).parentJoint]:
-            if joint > 1:
-                model_joint = stance.robot.model.joints[joint]
-                mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
+        for joint in stance.limb(contact):
+            model_joint = stance.robot.model.joints[joint]
+            mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
     return mask
 
 
