@@ -49,3 +49,13 @@ def test_no_sweep_or_batch_has_a_margin_of_a_point(shod):
     assert "sole_polygon" not in swept
     found = evaluate_batch(shod, shod.q[None], [copsense.minimum_wrench(1.0)], gains=False)
     assert np.all(np.isinf(found.margin))
+
+
+def test_no_analysis_has_a_margin_of_a_point(shod):
+    found = copsense.analyse(shod, [TORQUE])
+    assert all("margin" not in row for row in contact_rows(found.to_dict()))
+
+
+def contact_rows(data):
+    """The rows of every contact in an analysis as plain data."""
+    return [row for c in data["criteria"].values() for row in c["contacts"].values()]
