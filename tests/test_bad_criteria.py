@@ -233,7 +233,7 @@ def test_a_law_s_own_error_stays_in_sight(icub):
 
 def test_a_law_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path):
     dataset = copsense.sweep(lateral_path, [failing, copsense.minimum_torque()])
-    failed = copsense.failed_rows(dataset)
+    failed = dataset.failed_rows
     assert {name for _, name, _ in failed} == {"failing"}
     assert len(failed) == len(lateral_path)
     assert not np.any(np.isnan(dataset["cop"].sel(criterion="minimum-torque")))

@@ -65,6 +65,7 @@ class BalancingController:
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
         self.stance, self.criterion, self.gains = stance, criterion, gains
+        self.limits = limits
         self.name = name or criterion.name
         if share is None and limits is not None and limits.any:
             share = ShareWithinLimits(stance, criterion, limits)
