@@ -10,7 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import finite_array, finite_number, owned
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.stance import Stance
 
@@ -41,7 +41,7 @@ class PostureCost:
             finite_number(getattr(self, name), f"the posture weight {name}", positive=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Posture:
     """A solved posture and how it moves when its request does.
 
@@ -56,6 +56,15 @@ class Posture:
     stance: Stance
     tangents: Float[np.ndarray, "nv r"]
     iterations: int
+
+    def __post_init__(self) -> None:
+        """Own the tangents."""
+        object.__setattr__(self, "tangents", owned(self.tangents))
+
+    def __repr__(self) -> str:
+        """The stance, and how many coordinates were requested."""
+        requests = self.tangents.shape[1]
+        return f"Posture({self.stance!r}, {requests} requested, {self.iterations} iterations)"
 
 
 def solve_posture(
