@@ -7,7 +7,6 @@ evaluates many, and a design chooses the criterion.
 """
 
 from copsense._version import __version__
-from copsense.binding import LimitChange, next_change
 from copsense.contact import Contact, Plane, rectangle
 from copsense.cop import (
     EdgeMargin,
@@ -36,10 +35,9 @@ from copsense.design import Design, design_criterion, families
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
 from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
-from copsense.margins import limit_margins, limit_travel
-from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
+from copsense.margins import limit_margins
+from copsense.path import LateralPath, PosturePath, joint_sweep, lateral_sweep, path_through
 from copsense.posture import Posture, PostureCost, retract, solve_posture
-from copsense.recorded import with_limit_margins
 from copsense.regions import ComRegion, com_region, criterion_region
 from copsense.robot import Robot
 from copsense.robots import (
@@ -51,6 +49,7 @@ from copsense.robots import (
     sole_notes,
     stand,
 )
+from copsense.scan import PathScan, limit_travel, next_active_set_change
 from copsense.sensitivity import (
     CopSensitivity,
     check_sensitivity,
@@ -66,6 +65,7 @@ from copsense.statics import (
     wrench_policy,
 )
 from copsense.storage import load_results, write_results
+from copsense.sweep_margins import with_limit_margins
 from copsense.sweeps import failed_rows, sweep
 
 __all__ = [
@@ -81,11 +81,12 @@ __all__ = [
     "Design",
     "EdgeMargin",
     "Grid",
-    "LimitChange",
+    "LateralPath",
     "Limits",
     "Plane",
     "Posture",
     "PostureCost",
+    "PathScan",
     "PosturePath",
     "Robot",
     "Sample",
@@ -125,7 +126,7 @@ __all__ = [
     "minimum_torque",
     "minimum_wrench",
     "mixed",
-    "next_change",
+    "next_active_set_change",
     "path_through",
     "read_sole",
     "rectangle",

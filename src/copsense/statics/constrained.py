@@ -65,21 +65,36 @@ class ActiveLimit:
         return self.multiplier == 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ActiveSetChange:
-    """The next limit to begin or cease to press along a motion, to first order.
+    """The next limit to begin or cease to press along a motion.
+
+    A prediction to first order has the first five; what a search along a path finds
+    (`copsense.next_active_set_change`) has them all.
 
     Attributes:
+        criterion: the criterion's name.
         name: the limit's name.
         kind: as of `ActiveLimit`.
         binds: whether it begins to bind; False where it lets go.
-        travel: how far along the motion, in units of it.
+        travel: how far along the motion, in units of it; of a path, of its coordinate.
+        first_order: the travel predicted where the search began; infinite if no change was. It may
+            be another limit's.
+        value: the path's coordinate there, such as world y of the CoM [m].
+        before: d CoP / d coordinate of each contact just before the change (nc, 2), contact axes;
+            None where a contact carries no load there, and has no centre of pressure.
+        after: the same just after; None too where the limits leave no way forward.
     """
 
+    criterion: str
     name: str
     kind: str
     binds: bool
     travel: float
+    first_order: float | None = None
+    value: float | None = None
+    before: Float[np.ndarray, "nc 2"] | None = None
+    after: Float[np.ndarray, "nc 2"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,29 +168,26 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         """The one-sided derivative along an admissible motion: what happens when it begins."""
         return self._problem.rates(self, direction)
 
-    def next_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
+    def next_active_set_change(
+        self, direction: Float[np.ndarray, " nv"]
+    ) -> ActiveSetChange | None:
         """The first change of the pressing limits along an admissible motion, to first order.
 
-        The ratio test: a limit off its bound closes in at the rate of its slack (a centre of
-        pressure at that of its distance to the edge), a pressing one eases at the rate of its
-        multiplier. What is only touched here has taken a side already. None if nothing closes in.
+        The ratio test: a limit off its bound closes in at the rate of its slack (of a centre of
+        pressure f_z (b - a p)), a pressing one eases at the rate of its multiplier. What is only
+        touched here has taken a side already. None if nothing closes in.
         """
         rates = self.rates(direction)
         strong, touching = self._problem.strong, self._problem.strong | self._problem.weak
-        slack, closing = self.slack, -rates.slack
-        # (s / f_z)' = (s' - (s / f_z) f_z') / f_z, here as the rate of s that has the same ratio.
-        normal = self._problem.normal
-        cop = np.flatnonzero(normal >= 0)
-        fz = normal[cop]
-        closing[cop] += slack[cop] * rates.forces[fz] / self.forces[fz]
-        left = np.where(touching, self.row_multipliers, slack)
-        closing = np.where(touching, -rates.multipliers, closing)
+        left = np.where(touching, self.row_multipliers, self.slack)
+        closing = -np.where(touching, rates.multipliers, rates.slack)
         nearer = (closing > _CLOSING * np.abs(left)) & (strong | ~touching)
         if not np.any(nearer):
             return None
         travel = np.where(nearer, left / np.where(nearer, closing, 1.0), np.inf)
         i = int(np.argmin(travel))
-        return ActiveSetChange(self.names[i], self.kinds[i], not strong[i], float(travel[i]))
+        name, kind, binds = self.names[i], self.kinds[i], not strong[i]
+        return ActiveSetChange(self._problem.criterion.name, name, kind, binds, float(travel[i]))
 
     @cached_property
     def _problem(self) -> _Problem:
@@ -199,39 +211,37 @@ def solve_constrained(
         UnsolvedError: no solver found wrenches that meet the optimality conditions.
     """
     problem = _Problem(stance, criterion, limits)
-    f, nu, multipliers, slack = problem.solve()
-    torques = (stance.gravity - stance.jacobian.T @ f)[stance.robot.base_nv :]
-    found = ConstrainedEquilibrium(
-        stance,
-        criterion,
-        f,
-        torques,
-        nu,
-        limits,
-        problem.names,
-        problem.kinds,
-        slack,
-        multipliers,
-    )
-    found.__dict__["_problem"] = problem
-    return found
+    return problem.equilibrium(limits, *problem.solve())
 
 
 def distance_to_change(
-    stance: Stance, criterion: Criterion, limits: Limits, pressing: Int[np.ndarray, " a"]
-) -> Float[np.ndarray, " r"]:
-    """How far each row is from changing sides if these rows press.
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    pressing: Int[np.ndarray, " a"],
+    tangent: Float[np.ndarray, " nv"],
+) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+    """How far each row is from changing sides if these rows press, and its rate along a motion.
 
     The slack of a row off its bound, in shares of the weight; the multiplier of one that presses,
     in shares of the cost's gradient. These rows are the criterion's choice as long as none is
-    negative.
+    negative. The rates are exact where a distance is zero: the shares are held.
     """
     problem = _Problem(stance, criterion, limits)
     optimum = problem.program.optimum(pressing)
-    distance = (problem.b - problem.A @ optimum.x) / (problem.weight * problem.scale)
+    multipliers = optimum.multipliers
+    slack = problem.b - problem.A @ optimum.x
+    found = problem.equilibrium(limits, optimum.x, multipliers, slack)
+    held = np.flatnonzero(multipliers)
+    _, joints, _, bound = problem.rates_of_data(found, tangent[:, None])
+    df, _, dl = problem.differentiate(found, tangent[:, None], held)
+    distance = slack / (problem.weight * problem.scale)
+    rate = (bound - problem.A @ df)[:, 0] / (problem.weight * problem.scale)
     gradient = max(float(np.abs(problem.H @ optimum.x - problem.g).max()), 1e-300)
-    distance[pressing] = (optimum.multipliers * problem.scale)[pressing] / gradient
-    return distance
+    distance[pressing] = (multipliers * problem.scale)[pressing] / gradient
+    rate[pressing] = 0.0
+    rate[held] = dl[:, 0] * problem.scale[held] / gradient
+    return distance, rate
 
 
 class _Problem:
@@ -251,12 +261,6 @@ class _Problem:
         # A contact's row has no joint, and no sign.
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
-        # Row of the normal force under a centre of pressure; -1 for any other limit.
-        under = [
-            stance.rows[k].start + stance.contacts[k].components.index(2) if kind == "cop" else -1
-            for k, kind in zip(rows.contacts, rows.kinds, strict=True)
-        ]
-        self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
         self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(rows.joint)
         self.weight = stance.robot.weight
@@ -264,8 +268,8 @@ class _Problem:
         self.scale = self.program.scale
         self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
 
-    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, multipliers of the statics and of the rows, slack."""
+    def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Forces, multipliers of the rows, slack."""
         program = self.program
         curvature = program.curvature
         if len(curvature) and curvature[0] <= _SINGULAR * curvature[-1]:
@@ -287,6 +291,12 @@ class _Problem:
         self.weak = touching & ~self.strong
         multipliers[~self.strong] = 0.0
         slack[self.strong] = 0.0
+        return f, multipliers, slack
+
+    def equilibrium(
+        self, limits: Limits, f: np.ndarray, multipliers: np.ndarray, slack: np.ndarray
+    ) -> ConstrainedEquilibrium:
+        """The equilibrium with these forces, multipliers of the rows and slack."""
         tau = self.Gj - self.Jj.T @ f
         nu = np.zeros(len(self.Gb) + len(self.Gj))
         nu[self.nb :] = self.W @ tau
@@ -301,17 +311,31 @@ class _Problem:
             - self.Jj @ nu[self.nb :]
         )
         nu[: self.nb] = np.linalg.lstsq(self.Jb, left, rcond=None)[0]
-        return f, nu, multipliers, slack
+        found = ConstrainedEquilibrium(
+            self.stance,
+            self.criterion,
+            f,
+            tau,
+            nu,
+            limits,
+            self.names,
+            self.kinds,
+            slack,
+            multipliers,
+        )
+        # Kept for the derivatives, which use the same rows.
+        found.__dict__["_problem"] = self
+        return found
 
     def differentiate(
         self, at: ConstrainedEquilibrium, V: Float[np.ndarray, "nv p"], held: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows along V, with these rows held."""
-        base, joints, change, bound = self._rates_of_data(at, V)
+        base, joints, change, bound = self.rates_of_data(at, V)
         df, _, dl = self.program.hold(held, change, base, bound[held])
         return df, joints - self.Jj.T @ df, dl
 
-    def _rates_of_data(
+    def rates_of_data(
         self, at: ConstrainedEquilibrium, V: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
@@ -341,7 +365,7 @@ class _Problem:
     def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
         """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
-        base, joints, c, bound = (x[:, 0] for x in self._rates_of_data(at, v[:, None]))
+        base, joints, c, bound = (x[:, 0] for x in self.rates_of_data(at, v[:, None]))
         E, e = np.hstack([self.Jb, self.A[strong].T]), np.concatenate([base, bound[strong]])
         size = float(np.abs(self.differentiate(at, v[:, None], strong)[0]).max())
         unit = max(size if np.isfinite(size) else 0.0, float(np.abs(e).max()), 1e-300)
