@@ -10,7 +10,7 @@ import copsense
 from copsense.design import Family, design_criterion, families, joint_groups, score
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import NO_LIMITS, Limits
-from copsense.margins import limit_travel
+from copsense.scan import limit_travel
 
 D, HALF = 0.14, 0.03
 WITHIN = 3 * 0.0693 / 11  # m: three postures to either side, the last ones included

@@ -119,9 +119,7 @@ class MarginTable:
             margins[..., i] = values[..., rows].min(axis=-1)
         return margins
 
-    def margin(
-        self, rows: np.ndarray, values: Float[np.ndarray, " r"]
-    ) -> LimitMargin:
+    def margin(self, rows: np.ndarray, values: Float[np.ndarray, " r"]) -> LimitMargin:
         """The smallest of a group."""
         i = int(rows[int(np.argmin(values[rows]))])
         kind = self.kinds[i]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -22,16 +21,8 @@ from copsense.stance import Stance
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
 
-class PostureSolver(Protocol):
-    """Finds the postures of a path."""
-
-    def __call__(self, value: float, near: Stance, /) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-        """The stance where the coordinate has this value, and dq/dcoordinate.
-
-        Args:
-            value: of the path's coordinate.
-            near: where to start the search.
-        """
+# A value of a path's coordinate, and a stance to start from -> the posture there and its tangent.
+PostureSolver = Callable[[float, Stance], tuple[Stance, Float[np.ndarray, " nv"]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +77,10 @@ class PosturePath:
                 "joint_sweep."
             )
         known = [k for k in range(len(self)) if k not in self.failures]
-        near = self.stances[min(known, key=lambda k: abs(self.values[k] - value))] if known else (
-            self.stances[i]
+        near = (
+            self.stances[min(known, key=lambda k: abs(self.values[k] - value))]
+            if known
+            else (self.stances[i])
         )
         return self.solver(value, near)
 
@@ -322,7 +315,7 @@ class _Lateral:
     com_x: float | None
     cost: PostureCost | None
 
-    def __call__(self, value: float, near: Stance, /) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
         com = (self.com_x, value, None)
         found = solve_posture(near, com=com, reference=self.stance.q, cost=self.cost)
         return found.stance, found.tangents[:, 0 if self.com_x is None else 1]
@@ -336,7 +329,7 @@ class _OfJoint:
     joint: str
     cost: PostureCost | None
 
-    def __call__(self, value: float, near: Stance, /) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
         held = {self.joint: value}
         found = solve_posture(near, joints=held, reference=self.stance.q, cost=self.cost)
         return found.stance, found.tangents[:, 0]
@@ -349,7 +342,7 @@ class _Shifted:
     solver: PostureSolver
     by: float
 
-    def __call__(self, value: float, near: Stance, /) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
         return self.solver(value - self.by, near)
 
 

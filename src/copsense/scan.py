@@ -196,6 +196,11 @@ class PathScan:
         self._begin = nearest if near or not path.continuous else self.start
         self._points: dict[float, ScanPoint] = {}
 
+    @property
+    def begin(self) -> ScanPoint:
+        """Where a search sets out: at the start, or at the posture nearest to it."""
+        return self.at(self._begin)
+
     def at(self, value: float) -> ScanPoint:
         """The equilibrium at a value of the path's coordinate, solved once.
 
@@ -305,11 +310,13 @@ class PathScan:
             side: +1 towards rising values of the coordinate, or -1.
         """
         side = check_side(side)
-        begin = self.at(self._begin)
+        begin = self.begin
         table = margin_table(begin.stance, limits)
 
         def measure(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:
-            return table.slack(point.forces, point.torques), side * table.slack_rates(*_rates(point))
+            return table.slack(point.forces, point.torques), side * table.slack_rates(
+                *_rates(point)
+            )
 
         track = Track(lambda travel: measure(self.at(self.start + side * travel)))
         reach = 0.0
@@ -353,7 +360,7 @@ class PathScan:
         side = check_side(side)
         if self.limits is None or not self.limits.any:
             raise InvalidInputError("no limit is switched on: there is none to meet. Give one.")
-        limits, begin = self.limits, self.at(self._begin)
+        limits, begin = self.limits, self.begin
         assert isinstance(begin.equilibrium, ConstrainedEquilibrium)
         predicted = begin.sensitivity.next_active_set_change(side * begin.tangent)
         pressing = begin.equilibrium.pressing_after(side * begin.tangent)

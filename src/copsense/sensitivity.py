@@ -189,8 +189,7 @@ class CopSensitivity:
         # The largest singular value, 0 where the contacts leave nothing to move.
         motions = self.equilibrium.stance.energy_motions
         speeds = [
-            np.linalg.svd(eta @ motions, compute_uv=False).max(initial=0.0)
-            for eta in self.gradient
+            np.linalg.svd(eta @ motions, compute_uv=False).max(initial=0.0) for eta in self.gradient
         ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 

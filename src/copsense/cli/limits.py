@@ -13,8 +13,10 @@ from copsense.errors import CopsenseError
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.limits import Limits
+    from copsense.scan import PathScan
     from copsense.sensitivity import CopSensitivity
     from copsense.stance import Stance
+    from copsense.statics import ActiveSetChange
 
 _REACH, _POSTURES = 0.05, 21  # of the CoM's path that is drawn with the regions [m]
 
@@ -32,7 +34,9 @@ def add_limits(
     The changes are along the path's tangent, to either side, first order and exact.
     """
     from copsense.limits import torque_placeholders
-    from copsense.margins import limit_margins, limit_travel
+    from copsense.margins import limit_margins
+    from copsense.path import LateralPath
+    from copsense.scan import PathScan
     from copsense.statics import ConstrainedEquilibrium
 
     if limits.torque == "model" and torque_placeholders(stance):
@@ -40,18 +44,22 @@ def add_limits(
             "no torque limit in the model (a placeholder) for: "
             + ", ".join(torque_placeholders(stance))
         )
+    path = LateralPath(stance)  # its postures serve every criterion and question
     for criterion in criteria:
         row, equilibrium = answer["criteria"][criterion.name], results[criterion.name].equilibrium
         assert isinstance(equilibrium, ConstrainedEquilibrium)
         row["active_limits"] = [asdict(limit) for limit in equilibrium.active]
         row["optimality"] = equilibrium.optimality()
         row["limit_margins"] = [asdict(m) for m in limit_margins(equilibrium, limits)]
-        row["next_change"] = _changes(stance, criterion, limits, results[criterion.name], tangent)
+        row["next_change"] = _changes(
+            PathScan(path, criterion, limits), results[criterion.name], tangent
+        )
         if not row["next_change"]:
             answer.setdefault("notes", []).append(
                 f"the limits that {criterion.name} presses here are degenerate: the next change of "
                 "them is not told. Move a little."
             )
+        own = PathScan(path, criterion)
         row["limit_travel"] = {
             f"{'+' if side > 0 else '-'}y": [
                 {
@@ -61,32 +69,37 @@ def add_limits(
                     "first_order": t.first_order,
                     "exact": t.exact,
                 }
-                for t in limit_travel(stance, criterion, limits, side).limits
+                for t in own.travel(limits, side).limits
             ]
             for side in (1, -1)
         }
 
 
-def _changes(
-    stance: Stance, criterion: Criterion, limits: Limits, result: CopSensitivity, tangent: Any
-) -> dict[str, Any]:
+def _changes(scan: PathScan, result: CopSensitivity, tangent: Any) -> dict[str, Any]:
     """The next change of the active limits to either side; nothing where none can be told."""
-    from copsense.binding import next_change
-
     found: dict[str, Any] = {}
     try:
-        back, forth = result.active_set_changes(tangent)
-        for side, first in ((1, forth), (-1, back)):
-            exact = next_change(stance, criterion, limits, side)
+        for side in (1, -1):
+            first = result.next_active_set_change(side * tangent)
+            exact = scan.next_active_set_change(side)
             found[f"{'+' if side > 0 else '-'}y"] = {
-                "first_order": None if first is None else asdict(first),
-                "exact": None
-                if exact is None
-                else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+                "first_order": _change(first),
+                "exact": _change(exact),
             }
     except CopsenseError:
         return {}
     return found
+
+
+def _change(change: ActiveSetChange | None) -> dict[str, Any] | None:
+    if change is None:
+        return None
+    return {
+        "name": change.name,
+        "kind": change.kind,
+        "binds": change.binds,
+        "travel": change.travel,
+    }
 
 
 def limit_verdict(answer: dict[str, Any]) -> str:

@@ -73,8 +73,8 @@ def sweep(
     ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. A posture that fails is
     a row with its reason, and makes the exit code 1.
     """
-    from copsense.recorded import with_limit_margins
     from copsense.storage import check_output, write_results
+    from copsense.sweep_margins import with_limit_margins
     from copsense.sweeps import failed_rows
     from copsense.sweeps import sweep as evaluate
 
@@ -135,8 +135,8 @@ def plot(file: str, output: str | None, limits: str | None, force: bool) -> None
     criterion meets its first one: to the recorded wrenches, whatever the sweep was evaluated with.
     """
     from copsense.plots import plot_results, save_figure
-    from copsense.recorded import with_limit_margins
     from copsense.storage import check_output, load_results
+    from copsense.sweep_margins import with_limit_margins
 
     dataset, chosen = load_results(file), read_limits(limits)
     if chosen is not None:

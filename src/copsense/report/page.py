@@ -9,13 +9,13 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
 
-from copsense.binding import LimitChange
 from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
 from copsense.report.figure import ReportFigure
 from copsense.report.sway import score_rows, score_words, sway_differences, sway_runs
 from copsense.report.typesetting import typeset
 from copsense.report.words import commands, differs, limit_words, limits, summary
 from copsense.reproduction import Reproduction
+from copsense.statics import ActiveSetChange
 
 _MARKS = {
     Verdict.HOLDS: ("holds", "✓", "hold"),
@@ -97,13 +97,13 @@ def number(value: float, unit: str = "1") -> str:
     return text if unit == "1" else f"{text} {unit}"
 
 
-def _binding(found: LimitChange) -> dict[str, str]:
+def _binding(found: ActiveSetChange) -> dict[str, str]:
     sides = {
         name: "none" if side is None else ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
         for name, side in (("before", found.before), ("after", found.after))
     }
-    where = f"{found.com_y * 1e3:+.2f} mm"
-    limit = found.limit if found.binds else f"{found.limit} lets go"
+    where = f"{found.value * 1e3:+.2f} mm"
+    limit = found.name if found.binds else f"{found.name} lets go"
     return {"criterion": found.criterion, "limit": limit, "com_y": where} | sides
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from copsense.binding import next_change
 from copsense.limits import Limits
-from copsense.path import PosturePath
-from copsense.recorded import with_limit_margins
+from copsense.path import LateralPath, PosturePath
 from copsense.regions import com_region, criterion_region
 from copsense.reproduction.clock import Clock
 from copsense.reproduction.lateral import paper_criteria
 from copsense.reproduction.result import WithinLimits
+from copsense.scan import PathScan
 from copsense.stance import Stance
+from copsense.sweep_margins import with_limit_margins
 from copsense.sweeps import sweep
 
 
@@ -24,10 +24,11 @@ def solve_within_limits(
     with clock.stage("limits: sensitivities", len(path)) as advance:
         dataset = with_limit_margins(sweep(path, criteria, limits, progress=advance), limits)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
-        bindings = []
+        bindings, lateral = [], LateralPath(stance)
         for criterion in criteria:
+            scan = PathScan(lateral, criterion, limits)
             for side in (-1, 1):
-                found = next_change(stance, criterion, limits, side)
+                found = scan.next_active_set_change(side)
                 if found:
                     bindings.append(found)
                 advance(1)

@@ -10,7 +10,6 @@ import pandas as pd
 import xarray as xr
 from jaxtyping import Float
 
-from copsense.binding import LimitChange
 from copsense.limits import Limits
 from copsense.paper import (
     EvaluatedClaim,
@@ -22,6 +21,7 @@ from copsense.paper import (
     Sway,
 )
 from copsense.regions import ComRegion
+from copsense.statics import ActiveSetChange
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class WithinLimits:
 
     limits: Limits
     lateral: xr.Dataset
-    bindings: tuple[LimitChange, ...]
+    bindings: tuple[ActiveSetChange, ...]
     regions: Mapping[str, ComRegion]
 
 

@@ -69,8 +69,8 @@ class ActiveLimit:
 class ActiveSetChange:
     """The next limit to begin or cease to press along a motion.
 
-    A prediction to first order has the first five; what a search along a path finds
-    (`copsense.next_active_set_change`) has them all.
+    A prediction to first order from one posture has the first five; what a search along a path
+    finds (`copsense.next_active_set_change`) has them all.
 
     Attributes:
         criterion: the criterion's name.
@@ -78,9 +78,9 @@ class ActiveSetChange:
         kind: as of `ActiveLimit`.
         binds: whether it begins to bind; False where it lets go.
         travel: how far along the motion, in units of it; of a path, of its coordinate.
-        first_order: the travel predicted where the search began; infinite if no change was. It may
-            be another limit's.
-        value: the path's coordinate there, such as world y of the CoM [m].
+        first_order: of a search, the travel predicted where it began; infinite if no change was. It
+            may be another limit's.
+        value: of a search, the path's coordinate there, such as world y of the CoM [m].
         before: d CoP / d coordinate of each contact just before the change (nc, 2), contact axes;
             None where a contact carries no load there, and has no centre of pressure.
         after: the same just after; None too where the limits leave no way forward.
@@ -91,8 +91,8 @@ class ActiveSetChange:
     kind: str
     binds: bool
     travel: float
-    first_order: float | None = None
-    value: float | None = None
+    first_order: float = np.nan
+    value: float = np.nan
     before: Float[np.ndarray, "nc 2"] | None = None
     after: Float[np.ndarray, "nc 2"] | None = None
 
@@ -168,9 +168,7 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         """The one-sided derivative along an admissible motion: what happens when it begins."""
         return self._problem.rates(self, direction)
 
-    def next_active_set_change(
-        self, direction: Float[np.ndarray, " nv"]
-    ) -> ActiveSetChange | None:
+    def next_active_set_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
         """The first change of the pressing limits along an admissible motion, to first order.
 
         The ratio test: a limit off its bound closes in at the rate of its slack (of a centre of
@@ -233,7 +231,7 @@ def distance_to_change(
     slack = problem.b - problem.A @ optimum.x
     found = problem.equilibrium(limits, optimum.x, multipliers, slack)
     held = np.flatnonzero(multipliers)
-    _, joints, _, bound = problem.rates_of_data(found, tangent[:, None])
+    _, _, _, bound = problem.rates_of_data(found, tangent[:, None])
     df, _, dl = problem.differentiate(found, tangent[:, None], held)
     distance = slack / (problem.weight * problem.scale)
     rate = (bound - problem.A @ df)[:, 0] / (problem.weight * problem.scale)

@@ -10,7 +10,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.margins import limit_margins
 from copsense.plots import plot_limit_margins, render_figure
 from copsense.plots.limits import first_limits
-from copsense.recorded import with_limit_margins
+from copsense.sweep_margins import with_limit_margins
 
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 LIMITS = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
