@@ -32,7 +32,7 @@ from copsense.comparison import (
     read_plan,
     run_benchmark,
 )
-from copsense.comparison.bench import Bench
+from copsense.comparison.case_runner import CaseRunner
 from copsense.controllers import BalancingController, Hold, Observation, Sine
 from copsense.plots import plot_benchmark, save_figure
 from copsense.simulation import MujocoSimulator
@@ -287,13 +287,13 @@ def speed() -> list[str]:
     plan = read_plan(HERE.with_suffix(".toml"))
     case = next(c for c in plan if c.label[:3] == ("icub", "straight", "minimum-wrench"))
     limited = next(c for c in plan if c.controller.name == "minimum-torque" + WITHIN)
-    bench = Bench(case)
-    stance = bench.stance
-    target = bench.reference(Hold()).at(0.0)
+    runner = CaseRunner(case)
+    stance = runner.stance
+    target = runner.reference(Hold()).at(0.0)
     seen = Observation(0.0, stance.q, np.zeros(stance.robot.model.nv), target, np.zeros((2, 6)))
     criterion = copsense.minimum_torque()
     for what, controller in (
-        ("controller, minimum wrench", bench.make_controller()),
+        ("controller, minimum wrench", runner.make_controller()),
         ("controller, minimum torque", BalancingController(stance, criterion)),
         (
             "controller, minimum torque, limits",
@@ -304,9 +304,9 @@ def speed() -> list[str]:
     simulator = MujocoSimulator(stance)
     torques = copsense.solve_equilibrium(stance, criterion).torques
     lines.append(_timed("physics, 8 points of contact", lambda: simulator.step(torques), 300))
-    reference = bench.reference(Sine(0.02, 0.2))
+    reference = runner.reference(Sine(0.02, 0.2))
     start = time.perf_counter()
-    bench.run(reference, 5.0)
+    runner.run(reference, 5.0)
     factor = 5.0 / (time.perf_counter() - start)
     return [*lines, "", f"A closed loop of 5 s at 1 kHz ran at {factor:.2f} times real time."]
 

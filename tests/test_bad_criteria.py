@@ -98,8 +98,19 @@ def test_limits_that_are_not_positive_cannot_weigh(icub, limit):
     efforts[6 + icub.robot.joint_names.index("l_knee")] = limit
     model.upperEffortLimit = efforts
     stance = copsense.Stance(copsense.Robot.from_model(model), icub.q, icub.contacts)
-    with pytest.raises(InvalidInputError, match=r"1/limit\^2.*limit for l_knee\. Give weights"):
+    with pytest.raises(InvalidInputError, match=r"1/limit\^2.*of l_knee, torso_.*Give weights"):
         copsense.solve_equilibrium(stance, weighted("1/limit^2"))
+
+
+def test_placeholders_of_the_model_cannot_weigh_as_if_they_were_limits(icub):
+    with pytest.raises(
+        InvalidInputError, match=r"placeholder.* of torso_pitch, .*Give weights"
+    ) as e:
+        copsense.solve_equilibrium(icub, weighted("1/limit^2"))
+    assert "l_knee" not in str(e.value)
+    effort = dict(zip(icub.robot.torque_names, icub.robot.effort_limits, strict=True))
+    remedy = weighted({joint: 1 / limit**2 for joint, limit in effort.items() if limit < np.inf})
+    assert copsense.solve_equilibrium(icub, remedy).residual() < 1e-9
 
 
 @pytest.mark.parametrize(

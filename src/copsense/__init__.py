@@ -1,72 +1,78 @@
 """Static centre-of-pressure sensitivity for legged robots.
 
-The public names, in the order of the flow: a robot stands on contacts (a stance); a criterion
-shares its load among them (an equilibrium); each contact has a centre of pressure, and a
-sensitivity of it; limits clip the wrenches, and say how far the centre of mass may go; a sweep
-evaluates many, and a design chooses the criterion.
+The names of every day are here; the rest is in the modules, ``copsense.cop`` or ``copsense.maps``,
+which are imported when they are first used, as these names are.
 """
 
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from typing import TYPE_CHECKING, Any
+
 from copsense._version import __version__
-from copsense.contact import Contact, Plane, rectangle
-from copsense.cop import (
-    EdgeMargin,
-    center_of_pressure,
-    com_projection,
-    contact_cops,
-    edge_margin,
-    foot_rotation_indicator,
-    total_center_of_pressure,
-    zero_moment_point,
-)
-from copsense.criterion import (
-    CRITERIA,
-    Criterion,
-    TorqueTerm,
-    WrenchTerm,
-    criterion_named,
-    minimum_tangential,
-    minimum_torque,
-    minimum_wrench,
-    mixed,
-    reference_wrench,
-    weighted_torque,
-)
-from copsense.design import Design, design_criterion, families
-from copsense.errors import CopsenseError
-from copsense.limits import Limits
-from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
-from copsense.margins import limit_margins
-from copsense.path import LateralPath, PosturePath, joint_sweep, lateral_sweep, path_through
-from copsense.posture import Posture, PostureCost, retract, solve_posture
-from copsense.regions import ComRegion, com_region, criterion_region
-from copsense.robot import Robot
-from copsense.robots import (
-    PRESETS,
-    four_bar_angles,
-    four_bar_robot,
-    load_robot,
-    load_stance,
-    sole_notes,
-    stand,
-)
-from copsense.scan import PathScan, limit_travel, next_active_set_change
-from copsense.sensitivity import (
-    CopSensitivity,
-    check_sensitivity,
-    cop_sensitivity,
-    finite_difference_sensitivity,
-)
-from copsense.sole import Sole, read_sole
-from copsense.stance import Stance
-from copsense.statics import (
-    ConstrainedEquilibrium,
-    StaticEquilibrium,
-    solve_equilibrium,
-    wrench_policy,
-)
-from copsense.storage import load_results, write_results
-from copsense.sweep_margins import with_limit_margins
-from copsense.sweeps import failed_rows, sweep
+
+if TYPE_CHECKING:
+    from copsense.contact import Contact, Plane, rectangle
+    from copsense.cop import (
+        EdgeMargin,
+        center_of_pressure,
+        com_projection,
+        contact_cops,
+        edge_margin,
+        foot_rotation_indicator,
+        total_center_of_pressure,
+        zero_moment_point,
+    )
+    from copsense.criterion import (
+        CRITERIA,
+        Criterion,
+        TorqueTerm,
+        WrenchTerm,
+        criterion_named,
+        minimum_tangential,
+        minimum_torque,
+        minimum_wrench,
+        mixed,
+        reference_wrench,
+        weighted_torque,
+    )
+    from copsense.design import Design, design_criterion, families
+    from copsense.errors import CopsenseError
+    from copsense.limits import Limits
+    from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
+    from copsense.margins import limit_margins
+    from copsense.path import LateralPath, PosturePath, joint_sweep, lateral_sweep, path_through
+    from copsense.posture import Posture, PostureCost, retract, solve_posture
+    from copsense.regions import ComRegion, com_region, criterion_region
+    from copsense.robot import Robot
+    from copsense.robots import (
+        PRESETS,
+        four_bar_angles,
+        four_bar_robot,
+        load_robot,
+        load_stance,
+        sole_notes,
+        stand,
+    )
+    from copsense.scan import PathScan, limit_travel, next_active_set_change
+    from copsense.sensitivity import (
+        CopSensitivity,
+        check_sensitivity,
+        cop_sensitivity,
+        finite_difference_sensitivity,
+    )
+    from copsense.sole import Sole, read_sole
+    from copsense.stance import Stance
+    from copsense.statics import (
+        ConstrainedEquilibrium,
+        StaticEquilibrium,
+        solve_equilibrium,
+        wrench_policy,
+    )
+    from copsense.storage import load_results, write_results
+    from copsense.sweep_margins import with_limit_margins
+    from copsense.sweeps import failed_rows, sweep
 
 __all__ = [
     "CRITERIA",
@@ -144,3 +150,133 @@ __all__ = [
     "write_results",
     "zero_moment_point",
 ]
+
+# Module -> the names that it gives to this one. Type checkers read the imports above.
+_HOMES = {
+    "copsense.contact": (
+        "Contact",
+        "Plane",
+        "rectangle",
+    ),
+    "copsense.cop": (
+        "EdgeMargin",
+        "center_of_pressure",
+        "com_projection",
+        "contact_cops",
+        "edge_margin",
+        "foot_rotation_indicator",
+        "total_center_of_pressure",
+        "zero_moment_point",
+    ),
+    "copsense.criterion": (
+        "CRITERIA",
+        "Criterion",
+        "TorqueTerm",
+        "WrenchTerm",
+        "criterion_named",
+        "minimum_tangential",
+        "minimum_torque",
+        "minimum_wrench",
+        "mixed",
+        "reference_wrench",
+        "weighted_torque",
+    ),
+    "copsense.design": (
+        "Design",
+        "design_criterion",
+        "families",
+    ),
+    "copsense.errors": ("CopsenseError",),
+    "copsense.limits": ("Limits",),
+    "copsense.maps": (
+        "Axis",
+        "Grid",
+        "Sample",
+        "load_map",
+        "map_postures",
+        "map_summary",
+    ),
+    "copsense.margins": ("limit_margins",),
+    "copsense.path": (
+        "LateralPath",
+        "PosturePath",
+        "joint_sweep",
+        "lateral_sweep",
+        "path_through",
+    ),
+    "copsense.posture": (
+        "Posture",
+        "PostureCost",
+        "retract",
+        "solve_posture",
+    ),
+    "copsense.regions": (
+        "ComRegion",
+        "com_region",
+        "criterion_region",
+    ),
+    "copsense.robot": ("Robot",),
+    "copsense.robots": (
+        "PRESETS",
+        "four_bar_angles",
+        "four_bar_robot",
+        "load_robot",
+        "load_stance",
+        "sole_notes",
+        "stand",
+    ),
+    "copsense.scan": (
+        "PathScan",
+        "limit_travel",
+        "next_active_set_change",
+    ),
+    "copsense.sensitivity": (
+        "CopSensitivity",
+        "check_sensitivity",
+        "cop_sensitivity",
+        "finite_difference_sensitivity",
+    ),
+    "copsense.sole": (
+        "Sole",
+        "read_sole",
+    ),
+    "copsense.stance": ("Stance",),
+    "copsense.statics": (
+        "ConstrainedEquilibrium",
+        "StaticEquilibrium",
+        "solve_equilibrium",
+        "wrench_policy",
+    ),
+    "copsense.storage": (
+        "load_results",
+        "write_results",
+    ),
+    "copsense.sweep_margins": ("with_limit_margins",),
+    "copsense.sweeps": (
+        "failed_rows",
+        "sweep",
+    ),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        """A public name or a module, imported at its first use (PEP 562)."""
+        if name in _HOME_OF:
+            found = getattr(importlib.import_module(_HOME_OF[name]), name)
+        elif name in _modules():
+            found = importlib.import_module(f"{__name__}.{name}")
+        else:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = found
+        return found
+
+
+def __dir__() -> list[str]:
+    """The public names and the modules."""
+    return sorted({*__all__, *_modules(), *globals()})
+
+
+def _modules() -> set[str]:
+    return {module.name for module in pkgutil.iter_modules(__path__)}

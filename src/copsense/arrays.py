@@ -3,10 +3,34 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cached_property, update_wrapper
+from typing import Any, TypeVar
 
 import numpy as np
 
 from copsense.errors import InvalidInputError
+
+Array = TypeVar("Array", bound=np.ndarray)
+
+
+def read_only(array: Array) -> Array:
+    """The same array, which can no longer be written to."""
+    array.flags.writeable = False
+    return array
+
+
+def owned(array: np.ndarray) -> np.ndarray:
+    """A read-only copy of an array."""
+    return read_only(np.array(array))
+
+
+class array_property(cached_property[Array]):  # noqa: N801 (a decorator, as cached_property)
+    """A property that is computed once and hands out a read-only array."""
+
+    def __init__(self, function: Callable[[Any], Array]) -> None:
+        """Wrap the function that computes it."""
+        super().__init__(update_wrapper(lambda self: read_only(function(self)), function))
 
 
 def finite_array(

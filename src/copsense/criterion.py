@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.robot import PLACEHOLDER_EFFORT
 from copsense.stance import Stance
 
 TorqueWeights = ArrayLike | Mapping[str, float] | Literal["1/limit^2", "inverse inertia"]
@@ -292,12 +293,14 @@ def _torque_matrix(criterion: str, term: TorqueTerm, stance: Stance) -> np.ndarr
     if isinstance(weights, str):
         if weights != "1/limit^2":
             raise UnknownNameError("torque weight", weights, ("1/limit^2", "inverse inertia"))
-        limits = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :]
-        bad = [n for n, limit in zip(names, limits, strict=True) if not limit > 0]
+        limits = stance.robot.effort_limits
+        bad = [n for n, limit in zip(names, limits, strict=True) if np.isinf(limit)]
         if bad:
             raise InvalidInputError(
-                f"criterion {criterion!r} weighs by 1/limit^2, but the model gives no positive "
-                f"effort limit for {', '.join(bad)}. Give weights as {{joint: weight}}."
+                f"criterion {criterion!r} weighs by 1/limit^2, but the model gives only a "
+                f"placeholder (none, zero, or {PLACEHOLDER_EFFORT:g} and more) as the effort limit "
+                f"of {', '.join(bad)}. Give weights as {{joint: 1 / limit**2}}; a joint left out "
+                "costs nothing."
             )
         return np.diag(1.0 / limits**2)
     if isinstance(weights, Mapping):

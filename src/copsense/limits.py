@@ -16,8 +16,6 @@ from copsense.contact import Contact, edge_side, half_planes
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
-# Effort limits from here on are a modeller's "no limit", not a motor's.
-PLACEHOLDER_TORQUE = 1e4  # Nm
 _ROUNDING = 1e-9  # m
 _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
 
@@ -39,8 +37,8 @@ class Limits:
             (moments that the sole's friction can carry, Caron et al. 2015), which contains the
             friction and centre-of-pressure limits too; None switches it off.
         torque: ``"model"`` for the model's effort limits, a number for every joint, or joint ->
-            limit [Nm]; None switches it off. Placeholders of the model (none, zero, or
-            `PLACEHOLDER_TORQUE` and more) are no limits: `torque_placeholders` names them.
+            limit [Nm]; None switches it off. Placeholders of the model (see
+            `Robot.effort_limits`) are no limits: `torque_placeholders` names them.
     """
 
     normal_force: float | None = 0.0
@@ -193,8 +191,7 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
     if limits is None:
         return np.full(len(names), np.inf)
     if isinstance(limits, str):
-        model = np.asarray(stance.robot.model.upperEffortLimit)[stance.robot.base_nv :]
-        return np.where((model > 0) & (model < PLACEHOLDER_TORQUE), model, np.inf)
+        return stance.robot.effort_limits
     if isinstance(limits, Mapping):
         for joint in limits:
             if joint not in names:

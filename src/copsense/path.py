@@ -223,12 +223,11 @@ def joint_sweep(
         progress: called with 1 after each posture.
     """
     robot = stance.robot
-    kind = robot.model.joints[robot.joint_id(joint)].shortname()
-    unit = "m" if kind.startswith("JointModelP") else "rad"
     now = robot.joint_position(stance.q, joint)
 
     solver = _OfJoint(stance, joint, cost)
-    return _sweep(stance, joint, unit, _grid(start, stop, count), now, solver, progress)
+    values = _grid(start, stop, count)
+    return _sweep(stance, joint, robot.joint_unit(joint), values, now, solver, progress)
 
 
 def path_through(

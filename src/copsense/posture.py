@@ -108,7 +108,6 @@ def solve_posture(
     home = stance.q if reference is None else robot.check_configuration(reference)
     columns = [robot.velocity_index(joint) for joint in joints]
     weights = _weights(stance, cost)
-    curved = robot.model.copy()  # its gravity is set below, to bend the CoM constraint
     selector = np.eye(robot.model.nv)[columns]
     axes = [i for i, _ in wanted]
 
@@ -134,8 +133,9 @@ def solve_posture(
             contact_rows = here.jacobian.shape[0]
             pull = np.zeros(3)
             pull[axes] = multipliers[contact_rows : contact_rows + len(axes)]
-            curved.gravity.linear = -pull / robot.mass
-            hessian = hessian + here.balance_derivative(-multipliers[:contact_rows], curved)
+            hessian = hessian + here.balance_derivative(
+                -multipliers[:contact_rows], -pull / robot.mass
+            )
         K = np.block([[hessian, C.T], [C, np.zeros((len(h), len(h)))]])
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
             requests = len(axes) + len(columns)

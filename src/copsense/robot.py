@@ -4,24 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import array_property, finite_array, finite_number, read_only
 from copsense.description import Description, load_description, mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
 
+# Joints that slide along some of their axes, and the unit along or about each.
+_SLIDING = {
+    **dict.fromkeys(("PX", "PY", "PZ", "PrismaticUnaligned"), ("m",)),
+    "Translation": ("m",) * 3,
+    "Planar": ("m", "m", "rad"),
+    "FreeFlyer": ("m",) * 3 + ("rad",) * 3,
+}
+
 # Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
 _BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
 
+# Effort limits from here on are a modeller's "no limit", not a motor's.
+PLACEHOLDER_EFFORT = 1e4  # Nm, or N
+# Positions beyond this are how a parser writes infinity.
+_NO_POSITION = 1e30  # rad, or m
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Robot:
     """A floating-base robot at no particular posture.
 
@@ -36,7 +51,7 @@ class Robot:
     description: Description | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a model that has no floating base, or whose masses make no sense."""
+        """Reject a model that has no floating base, or whose masses make no sense."""
         model = self.model
         if model.njoints < 2 or model.joints[1].shortname() not in _FLOATING:
             root = model.joints[1].shortname() if model.njoints > 1 else "none"
@@ -44,6 +59,18 @@ class Robot:
                 f"robot {self.name!r} has no floating base (its first joint is {root}). Build the "
                 "pin.Model with pin.JointModelFreeFlyer() as root joint, load it from its URDF, or "
                 "put a <freejoint/> in its MJCF."
+            )
+        stray = [
+            model.names[i]
+            for i in range(1, model.njoints)
+            if list(model.subtrees[i]) != list(range(i, i + len(model.subtrees[i])))
+        ]
+        if stray:
+            raise InvalidInputError(
+                f"the joints of robot {self.name!r} are not in depth-first order: those carried by "
+                f"{', '.join(stray)} do not follow directly. Pinocchio's derivatives would be "
+                "wrong. Add the joints of each limb to its tip before those "
+                "of the next limb, or load the robot from its URDF or MJCF."
             )
         bent = [
             name
@@ -134,27 +161,27 @@ class Robot:
         reduced = pin.buildReducedModel(self.model, locked, pin.neutral(self.model))
         return replace(self, model=reduced)
 
-    @property
+    @cached_property
     def mass(self) -> float:
         """Total mass [kg]."""
         return float(sum(body.mass for body in self.model.inertias))
 
-    @property
+    @cached_property
     def weight(self) -> float:
         """Magnitude of the weight [N]."""
         return self.mass * float(np.linalg.norm(self.model.gravity.linear))
 
-    @property
+    @cached_property
     def base_nv(self) -> int:
         """Degrees of freedom of the base: 6, or 3 for a planar robot."""
         return int(self.model.joints[1].nv)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the actuated joints, in the model's order."""
         return tuple(self.model.names)[2:]
 
-    @property
+    @cached_property
     def torque_names(self) -> tuple[str, ...]:
         """One label per entry of the torques: the joint, with an index where it has several."""
         labels: list[str] = []
@@ -162,17 +189,49 @@ class Robot:
             labels += [name] if joint.nv == 1 else [f"{name}[{i}]" for i in range(joint.nv)]
         return tuple(labels)
 
-    @property
+    @cached_property
     def velocity_names(self) -> tuple[str, ...]:
         """One label per entry of a velocity: the base in its own frame, then the joints."""
         six = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
         base = six if self.base_nv == 6 else ("base_vx", "base_vy", "base_w")
         return base + self.torque_names
 
-    @property
+    @cached_property
     def frame_names(self) -> tuple[str, ...]:
         """Names of every frame in the model."""
         return tuple(frame.name for frame in self.model.frames)
+
+    @cached_property
+    def position_limits(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """Lowest and highest position of each entry of the torques (n,) [rad, m].
+
+        Infinite where the model has no limit: a joint that turns without end, one of several
+        degrees of freedom, or one whose lower limit is not below its upper one.
+        """
+        lower = np.full(len(self.torque_names), -np.inf)
+        upper = np.full(len(self.torque_names), np.inf)
+        at, q = self.single_joints
+        low, high = self.model.lowerPositionLimit[q], self.model.upperPositionLimit[q]
+        lower[at] = np.where((low < high) & (low > -_NO_POSITION), low, -np.inf)
+        upper[at] = np.where((low < high) & (high < _NO_POSITION), high, np.inf)
+        return read_only(lower), read_only(upper)
+
+    @array_property
+    def effort_limits(self) -> Float[np.ndarray, " n"]:
+        """The model's effort limit of each entry of the torques (n,) [Nm, or N].
+
+        Infinite where the model gives a placeholder: none, zero, or `PLACEHOLDER_EFFORT` and more.
+        """
+        effort = np.asarray(self.model.upperEffortLimit)[self.base_nv :]
+        return np.where((effort > 0) & (effort < PLACEHOLDER_EFFORT), effort, np.inf)
+
+    @cached_property
+    def single_joints(self) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " s"]]:
+        """Joints whose position is one number: their entries of the torques, and of q."""
+        single = [joint for joint in list(self.model.joints)[2:] if joint.nq == 1]
+        torque = np.array([joint.idx_v - self.base_nv for joint in single], dtype=int)
+        position = np.array([joint.idx_q for joint in single], dtype=int)
+        return read_only(torque), read_only(position)
 
     def joint_id(self, name: str) -> int:
         """Index of an actuated joint in the model, or an error that lists the valid ones."""
@@ -189,6 +248,20 @@ class Robot:
                 "Name a revolute or prismatic joint."
             )
         return int(model_joint.idx_v)
+
+    @cached_property
+    def torque_units(self) -> tuple[str, ...]:
+        """Unit of the position behind each torque: ``"rad"``, or ``"m"`` if it slides."""
+        units: list[str] = []
+        for joint in list(self.model.joints)[2:]:
+            kind = joint.shortname().removeprefix("JointModel")
+            units += _SLIDING.get(kind, ("rad",) * joint.nv)
+        return tuple(units)
+
+    def joint_unit(self, joint: str) -> Literal["rad", "m"]:
+        """Unit of a one-degree-of-freedom joint's position: ``"rad"``, or ``"m"`` if it slides."""
+        unit = self.torque_units[self.velocity_index(joint) - self.base_nv]
+        return "m" if unit == "m" else "rad"
 
     def joint_position(self, q: Float[np.ndarray, " nq"], joint: str) -> float:
         """Position [rad or m] of a one-degree-of-freedom joint at a configuration."""
@@ -236,22 +309,30 @@ class Robot:
         Raises:
             InvalidInputError: wrong shape, NaN or infinity, or an unnormalised quaternion.
         """
+        if isinstance(q, np.ndarray) and q.shape == (self.model.nq,) and q.dtype == float:
+            array = q if np.isfinite(q).all() else self._configuration(q)
+        else:
+            array = self._configuration(q)
+        if not pin.isNormalized(self.model, array, 1e-6):
+            raise InvalidInputError(
+                "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
+                "length. Give it in the order x, y, z, w; pin.normalize(model, q) fixes rounding."
+            )
+        return read_only(pin.normalize(self.model, array))
+
+    def _configuration(self, q: object) -> Float[np.ndarray, " nq"]:
         meaning = (
             f"base position, quaternion (x, y, z, w), then {len(self.joint_names)} joints"
             if self.base_nv == 6
             else f"base position, cosine and sine, then {len(self.joint_names)} joints"
         )
-        array = finite_array(
+        return finite_array(
             q, f"the configuration q of robot {self.name!r}", (self.model.nq,), meaning
         )
-        if not pin.isNormalized(self.model, array, 1e-6):
-            raise InvalidInputError(
-                "the configuration q holds a quaternion (or cosine, sine pair) that is not of unit "
-                "length. Give it in the order x, y, z, w; pin.normalize(model, q) mends rounding."
-            )
-        array = pin.normalize(self.model, array)
-        array.flags.writeable = False
-        return array
+
+    def __repr__(self) -> str:
+        """Name, joints and mass."""
+        return f"Robot({self.name!r}, {len(self.torque_names)} joints, {self.mass:.4g} kg)"
 
 
 def build_model(description: Description) -> pin.Model:
@@ -269,6 +350,6 @@ def build_model(description: Description) -> pin.Model:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
         raise ModelLoadError(
-            f"{what} is no {description.language.upper()} that can be read: {reason.rstrip('.')}. "
+            f"{what} is not a readable {description.language.upper()}: {reason.rstrip('.')}. "
             "Correct the file."
         ) from None

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import InitVar, dataclass, field, replace
-from functools import cached_property
+from dataclasses import InitVar, dataclass, field
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
+from copsense import rigid_body
+from copsense.arrays import array_property, read_only
 from copsense.contact import COMPONENT_NAMES, Contact
-from copsense.errors import ContactGeometryError, InsufficientContactsError, InvalidInputError
+from copsense.errors import (
+    ContactGeometryError,
+    InsufficientContactsError,
+    InvalidInputError,
+    UnknownNameError,
+)
+from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
-_LOCAL = pin.ReferenceFrame.LOCAL
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost.
 RANK_TOLERANCE = 1e-9
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
@@ -26,13 +34,13 @@ POSITION_TOLERANCE = 1e-6  # m
 ANGLE_TOLERANCE = 1e-6  # rad
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stance:
     """A robot at rest on its contacts, which do not move.
 
     Rows of `jacobian`, of stacked forces and of wrenches follow the contacts' order and, in each
     contact, its components among (fx, fy, fz, mx, my, mz) in contact axes. Columns are Pinocchio's
-    velocity: the base in its own frame, then the joints.
+    velocity: the base in its own frame, then the joints. Arrays are read-only.
 
     Attributes:
         robot: the robot.
@@ -52,136 +60,152 @@ class Stance:
     q: Float[np.ndarray, " nq"]
     contacts: Sequence[Contact]
     check: InitVar[bool] = True
-    _data: pin.Data = field(init=False, repr=False)
+    _layout: _Layout = field(init=False)
+    # World placement of the contact frames as the foot carries them, and their local Jacobians.
+    _feet: tuple[pin.SE3, ...] = field(init=False)
+    _local: Float[np.ndarray, "nc 6 nv"] = field(init=False)
 
     def __post_init__(self, check: bool) -> None:
-        """Check the input and run the kinematics once."""
+        """Validate the input and run the kinematics once."""
         contacts = (self.contacts,) if isinstance(self.contacts, Contact) else tuple(self.contacts)
-        for contact in contacts:
-            if not isinstance(contact, Contact):
-                raise InvalidInputError(f"{contact!r} is no contact. Give Contact(frame=...).")
-        object.__setattr__(self, "contacts", contacts)
-        names = [contact.name for contact in contacts]
-        if not names:
-            raise InvalidInputError(
-                "a stance needs at least one contact. Give Contact(frame=...) for each foot; "
-                f"frames of {self.robot.name!r}: {', '.join(self.robot.frame_names)}."
-            )
-        if len(set(names)) != len(names):
-            raise InvalidInputError(
-                f"two contacts share a name: {', '.join(names)}. Give each frame once, or name "
-                "the contacts apart with Contact(name=...)."
-            )
-        object.__setattr__(self, "q", self.robot.check_configuration(self.q))
-        for contact in contacts:
-            if self.robot.frame(contact.frame).parentJoint == 0:
-                raise InvalidInputError(
-                    f"frame {contact.frame!r} of contact {contact.name!r} is fixed in the world: "
-                    "it is no part of the robot. Name a frame of a foot."
-                )
-        model = self.robot.model
-        data = model.createData()
-        object.__setattr__(self, "_data", data)
-        pin.computeJointJacobians(model, data, self.q)
+        layout = _layout(self.robot, contacts)
+        q = self.robot.check_configuration(self.q)
+        feet, local = rigid_body.place(self.robot, q, layout.attachments)
+        for name, value in (
+            ("contacts", contacts),
+            ("q", q),
+            ("_layout", layout),
+            ("_feet", feet),
+            ("_local", read_only(local)),
+        ):
+            object.__setattr__(self, name, value)
         if check:
-            _check_planes(self)
-            _check_support(self)
+            for k, contact in enumerate(contacts):
+                _check_plane(contact, feet[k])
+            if not any(contact.kind == "surface" for contact in contacts):
+                _check_support(self)
+
+    @classmethod
+    def from_model(
+        cls,
+        model: pin.Model,
+        q: ArrayLike,
+        contacts: Iterable[Contact | str],
+        *,
+        name: str | None = None,
+    ) -> Stance:
+        """A stance of a ready ``pin.Model``.
+
+        Args:
+            model: its first joint is a floating base; copied.
+            q: configuration (nq,): base position, quaternion (x, y, z, w), joints.
+            contacts: the contacts, or the frames of flat feet by name.
+            name: how the robot is called in results; default the model's name.
+
+        Raises:
+            CopsenseError: as `Robot.from_model` and `Stance`.
+        """
+        given = [Contact(frame=c) if isinstance(c, str) else c for c in contacts]
+        robot = Robot.from_model(model, name=name)
+        return cls(robot, robot.check_configuration(q), given)
+
+    def __repr__(self) -> str:
+        """Robot, contacts and centre of mass."""
+        contacts = ", ".join(f"{c.name} ({c.kind})" for c in self.contacts)
+        x, y, z = self.com
+        return (
+            f"Stance({self.robot.name!r} on {contacts}; CoM at ({x:.4g}, {y:.4g}, {z:.4g}) m, "
+            f"{self.robot.weight:.4g} N)"
+        )
 
     def at(self, q: ArrayLike, *, check: bool = True) -> Stance:
         """The same stance at another configuration."""
-        if not isinstance(q, np.ndarray):
-            q = self.robot.check_configuration(q)
-        return replace(self, q=q, check=check)
+        return Stance(self.robot, q, self.contacts, check)  # type: ignore[arg-type]
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
         """The same robot and configuration on other contacts."""
-        return replace(self, contacts=tuple(contacts))
+        return Stance(self.robot, self.q, tuple(contacts))
 
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the contacts, in order."""
-        return tuple(contact.name for contact in self.contacts)
+        return self._layout.names
 
     @cached_property
     def placements(self) -> tuple[pin.SE3, ...]:
         """World placement of each contact frame."""
-        found = []
-        for contact in self.contacts:
-            joint, placement = _attachment(self.robot, contact)
-            world = self._data.oMi[joint] * placement
-            if contact.kind == "point":
-                world = pin.SE3(_plane_axes(contact), world.translation)
-            found.append(world)
-        return tuple(found)
+        return tuple(
+            foot if axes is None else pin.SE3(axes, foot.translation)
+            for foot, axes in zip(self._feet, self._layout.fixed_axes, strict=True)
+        )
 
-    @cached_property
+    @property
     def rows(self) -> tuple[slice, ...]:
         """Rows of each contact in stacked forces."""
-        ends = np.cumsum([0] + [len(contact.components) for contact in self.contacts])
-        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+        return self._layout.rows
 
-    @cached_property
+    @property
     def row_names(self) -> tuple[str, ...]:
         """Names of the rows of stacked forces, such as ``"l_sole fz"``."""
-        return tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in self.contacts for i in c.components)
+        return self._layout.row_names
 
-    @cached_property
-    def component_index(self) -> np.ndarray:
+    @property
+    def component_index(self) -> Int[np.ndarray, " m"]:
         """For each row of stacked forces, its component 0..5 among (fx, fy, fz, mx, my, mz)."""
-        return np.array([i for contact in self.contacts for i in contact.components])
+        return self._layout.component_index
 
     @cached_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
         """Generalised gravity G(q) [N, Nm]: what the torques and contacts must balance."""
-        model = self.robot.model
-        return pin.computeGeneralizedGravity(model, model.createData(), self.q)
+        return rigid_body.gravity(self.robot, self.q)
 
-    @cached_property
+    @array_property
     def jacobian(self) -> Float[np.ndarray, "m nv"]:
         """Stacked contact Jacobian J: velocities of the contact frames, in contact axes."""
-        blocks = []
-        for contact in self.contacts:
-            local = self._local_jacobian(contact)
-            if contact.kind == "point":
-                local = self._point_axes(contact) @ local[:3]
-            else:
-                local = local[list(contact.components)]
-            blocks.append(local)
-        return np.vstack(blocks)
+        return self._stacked(self._local)
 
     @cached_property
     def com(self) -> Float[np.ndarray, " 3"]:
         """Centre of mass in the world [m]."""
-        return pin.centerOfMass(self.robot.model, self.robot.model.createData(), self.q)
+        return rigid_body.com(self.robot, self.q)
 
     @cached_property
     def com_jacobian(self) -> Float[np.ndarray, "3 nv"]:
         """Jacobian of the centre of mass, world axes."""
-        model = self.robot.model
-        return pin.jacobianCenterOfMass(model, model.createData(), self.q)
+        return rigid_body.com_jacobian(self.robot, self.q)
 
     @cached_property
     def mass_matrix(self) -> Float[np.ndarray, "nv nv"]:
         """Joint-space inertia M(q), symmetric."""
-        model = self.robot.model
-        return pin.crba(model, model.createData(), self.q, pin.Convention.WORLD)
+        return rigid_body.mass_matrix(self.robot, self.q)
 
-    @cached_property
+    @array_property
     def joint_limit_excess(self) -> Float[np.ndarray, " n"]:
         """How far each joint stands beyond the model's limits, zero within them [rad, m].
 
         Nothing here keeps a posture within them: this says where one is not.
         """
-        model, excess = self.robot.model, np.zeros(len(self.robot.torque_names))
-        for joint in list(model.joints)[2:]:
-            if joint.nq == 1:  # others have no limits to exceed
-                low, high = (
-                    model.lowerPositionLimit[joint.idx_q],
-                    model.upperPositionLimit[joint.idx_q],
-                )
-                beyond = max(low - self.q[joint.idx_q], self.q[joint.idx_q] - high, 0.0)
-                excess[joint.idx_v - self.robot.base_nv] = beyond if low < high else 0.0
+        (lower, upper), excess = self.robot.position_limits, np.zeros(len(self.robot.torque_names))
+        at, q = self.robot.single_joints
+        beyond = np.maximum(lower[at] - self.q[q], self.q[q] - upper[at])
+        excess[at] = np.maximum(beyond, 0.0)
         return excess
+
+    def limb(self, contact: Contact | str) -> tuple[int, ...]:
+        """Joints of the model between the base and a contact, the base's own left out.
+
+        Args:
+            contact: one of the stance's contacts, or its name.
+
+        Raises:
+            UnknownNameError: no contact has this name.
+        """
+        if isinstance(contact, str):
+            if contact not in self.contact_names:
+                raise UnknownNameError("contact", contact, self.contact_names)
+            contact = self.contacts[self.contact_names.index(contact)]
+        joint = self.robot.frame(contact.frame).parentJoint
+        return tuple(int(i) for i in self.robot.model.supports[joint] if i > 1)
 
     @cached_property
     def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -194,7 +218,7 @@ class Stance:
         singular = self._svd[1]
         return int(np.sum(singular > RANK_TOLERANCE * max(1.0, singular[0])))
 
-    @cached_property
+    @array_property
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
         """Orthonormal basis Z of the velocities that leave the contacts at rest: J Z = 0."""
         return self._svd[2][self.rank :].T.copy()
@@ -229,18 +253,16 @@ class Stance:
         share = np.linalg.norm(null, axis=1)
         return tuple(n for n, s in zip(self.row_names, share, strict=True) if s > 1e-6)
 
-    def stack(self, wrenches: Float[np.ndarray, "nc 6"]) -> Float[np.ndarray, " m"]:
-        """Wrenches (nc, 6) as stacked forces (m,), dropping what a contact cannot carry."""
-        return np.concatenate(
-            [w[list(c.components)] for w, c in zip(wrenches, self.contacts, strict=True)]
-        )
+    def stack(self, wrenches: Float[np.ndarray, "nc 6 *p"]) -> Float[np.ndarray, "m *p"]:
+        """Wrenches (nc, 6, ...) as stacked forces (m, ...), dropping what no contact carries."""
+        wrenches = np.asarray(wrenches)
+        return wrenches.reshape(6 * len(self.contacts), *wrenches.shape[2:])[self._layout.places]
 
     def unstack(self, forces: Float[np.ndarray, "m *p"]) -> Float[np.ndarray, "nc 6 *p"]:
         """Stacked forces (m, ...) as wrenches (nc, 6, ...), zero where a contact carries none."""
-        wrenches = np.zeros((len(self.contacts), 6, *forces.shape[1:]))
-        for k, (contact, rows) in enumerate(zip(self.contacts, self.rows, strict=True)):
-            wrenches[k, list(contact.components)] = forces[rows]
-        return wrenches
+        wrenches = np.zeros((6 * len(self.contacts), *forces.shape[1:]))
+        wrenches[self._layout.places] = forces
+        return wrenches.reshape(len(self.contacts), 6, *forces.shape[1:])
 
     def in_world_axes(self, wrenches: Float[np.ndarray, "nc 6"]) -> Float[np.ndarray, "nc 6"]:
         """Wrenches given in contact axes, in world axes about the same points."""
@@ -250,78 +272,136 @@ class Stance:
         ]
         return np.array(turned)
 
-    def joint_wrenches(self, forces: Float[np.ndarray, " m"]) -> list[pin.Force]:
-        """Stacked forces as one spatial force per joint of the model, in the joint's frame."""
-        external = [pin.Force.Zero() for _ in range(self.robot.model.njoints)]
-        for contact, wrench in zip(self.contacts, self.unstack(forces), strict=True):
-            joint, placement = _attachment(self.robot, contact)
-            if contact.kind == "point":
-                wrench = np.concatenate([self._point_axes(contact).T @ wrench[:3], np.zeros(3)])
-            external[joint] += placement.act(pin.Force(wrench))
+    def joint_wrenches(self, forces: Float[np.ndarray, " m"]) -> dict[int, pin.Force]:
+        """Stacked forces as spatial forces: joint of the model -> force in the joint's frame."""
+        external: dict[int, pin.Force] = {}
+        wrenches = self.unstack(forces)
+        for k, (joint, placement) in enumerate(self._layout.attachments):
+            wrench = wrenches[k]
+            if self._layout.fixed_axes[k] is not None:
+                wrench = np.concatenate([self._turn(k).T @ wrench[:3], np.zeros(3)])
+            force = placement.act(pin.Force(wrench))
+            external[joint] = external[joint] + force if joint in external else force
         return external
 
     def balance_derivative(
-        self, forces: Float[np.ndarray, " m"], model: pin.Model | None = None
+        self,
+        forces: Float[np.ndarray, " m"],
+        gravity: Float[np.ndarray, " 3"] | None = None,
     ) -> Float[np.ndarray, "nv nv"]:
         """A = d(G - J' f)/dq at fixed f in contact axes, along velocities of the model.
 
         Args:
             forces: stacked forces f (m,).
-            model: the robot's model with another gravity, for whoever needs the curvature of a
-                centre of mass rather than of the weight.
+            gravity: another gravity than the model's (3,) [m/s^2], for the curvature of a centre
+                of mass rather than of the weight.
 
         Exact along admissible motions; for surface contacts everywhere.
         """
-        model = model or self.robot.model
-        derivative = pin.computeStaticTorqueDerivatives(
-            model, model.createData(), self.q, self.joint_wrenches(forces)
+        derivative = rigid_body.static_torque_derivative(
+            self.robot, self.q, self.joint_wrenches(forces), gravity
         )
         # Pinocchio turns the force with its joint. A surface does not turn; a point foot does, and
         # its force stays fixed in the world: J_l' [f]x J_a is what that takes away.
-        for contact, rows in zip(self.contacts, self.rows, strict=True):
-            if contact.kind == "point":
-                local = self._local_jacobian(contact)
-                force = self._point_axes(contact).T @ forces[rows]
+        for k, rows in enumerate(self.rows):
+            if self._layout.fixed_axes[k] is not None:
+                local, force = self._local[k], self._turn(k).T @ forces[rows]
                 derivative -= local[:3].T @ pin.skew(force) @ local[3:]
         return derivative
 
     def motion_derivative(self, velocity: Float[np.ndarray, " nv"]) -> Float[np.ndarray, "m nv"]:
         """D = d(J v)/dq at fixed v, along velocities of the model."""
-        model, data = self.robot.model, self.robot.model.createData()
-        zero = np.zeros(model.nv)
-        pin.computeForwardKinematicsDerivatives(model, data, self.q, velocity, zero)
-        blocks = []
-        for contact in self.contacts:
-            joint, placement = _attachment(self.robot, contact)
-            derivative = pin.getFrameVelocityDerivatives(model, data, joint, placement, _LOCAL)[0]
-            if contact.kind == "point":
-                local = self._local_jacobian(contact)
-                turned = derivative[:3] - pin.skew(local[:3] @ velocity) @ local[3:]
-                blocks.append(self._point_axes(contact) @ turned)
-            else:
-                blocks.append(derivative[list(contact.components)])
-        return np.vstack(blocks)
+        derivatives = rigid_body.velocity_derivatives(
+            self.robot, self.q, velocity, self._layout.attachments
+        )
+        for k, axes in enumerate(self._layout.fixed_axes):
+            if axes is not None:
+                local = self._local[k]
+                derivatives[k, :3] -= pin.skew(local[:3] @ velocity) @ local[3:]
+        return self._stacked(derivatives)
 
-    def inertia_derivative(self, acceleration: Float[np.ndarray, " nv"]) -> np.ndarray:
+    def inertia_derivative(
+        self, acceleration: Float[np.ndarray, " nv"]
+    ) -> Float[np.ndarray, "nv nv"]:
         """d(M a)/dq at fixed a (nv x nv), along velocities of the model."""
-        model, zero = self.robot.model, np.zeros(self.robot.model.nv)
-        at_rest = pin.computeGeneralizedGravityDerivatives(model, model.createData(), self.q)
-        data = model.createData()  # kept alive: what comes back is a view of it
-        moving = pin.computeRNEADerivatives(model, data, self.q, zero, acceleration)[0]
-        return np.asarray(moving - at_rest)
+        return rigid_body.inertia_derivative(self.robot, self.q, acceleration)
 
-    def _local_jacobian(self, contact: Contact) -> Float[np.ndarray, "6 nv"]:
-        joint, placement = _attachment(self.robot, contact)
-        return pin.getFrameJacobian(self.robot.model, self._data, joint, placement, _LOCAL)
+    def _stacked(self, local: Float[np.ndarray, "nc 6 nv"]) -> Float[np.ndarray, "m nv"]:
+        """Rows in the feet's own axes as stacked rows in contact axes."""
+        for k, axes in enumerate(self._layout.fixed_axes):
+            if axes is not None:
+                local = local.copy()
+                local[k, :3] = self._turn(k) @ local[k, :3]
+        return self.stack(local)
 
-    def _point_axes(self, contact: Contact) -> Float[np.ndarray, "3 3"]:
-        """Rotation from the foot's local axes to a point contact's axes, fixed in the world."""
-        joint, placement = _attachment(self.robot, contact)
-        world = self._data.oMi[joint].rotation @ placement.rotation
-        return _plane_axes(contact).T @ world
+    def _turn(self, k: int) -> Float[np.ndarray, "3 3"]:
+        """Rotation from a foot's own axes to those of its point contact, fixed in the world."""
+        axes = self._layout.fixed_axes[k]
+        assert axes is not None
+        return np.asarray(axes.T @ self._feet[k].rotation)
 
 
-def _attachment(robot: Robot, contact: Contact) -> tuple[int, pin.SE3]:
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """What a robot's contacts are at every configuration.
+
+    Attributes:
+        names: of the contacts.
+        attachments: joint and placement on it of each contact frame.
+        fixed_axes: world axes of a point contact; None for others, which turn with the foot.
+        rows: of each contact in stacked forces.
+        row_names: of stacked forces.
+        component_index: component 0..5 of each row (m,).
+        places: where each row stands among the contacts' wrenches, six numbers each (m,).
+    """
+
+    names: tuple[str, ...]
+    attachments: tuple[Attachment, ...]
+    fixed_axes: tuple[Float[np.ndarray, "3 3"] | None, ...]
+    rows: tuple[slice, ...]
+    row_names: tuple[str, ...]
+    component_index: Int[np.ndarray, " m"]
+    places: Int[np.ndarray, " m"]
+
+
+@lru_cache(maxsize=32)  # a path's stances share theirs
+def _layout(robot: Robot, contacts: tuple[Contact, ...]) -> _Layout:
+    """Validate contacts and look up where they are on the robot."""
+    for contact in contacts:
+        if not isinstance(contact, Contact):
+            raise InvalidInputError(f"{contact!r} is not a contact. Give Contact(frame=...).")
+    names = tuple(contact.name for contact in contacts)
+    if not names:
+        raise InvalidInputError(
+            "a stance needs at least one contact. Give Contact(frame=...) for each foot; "
+            f"frames of {robot.name!r}: {', '.join(robot.frame_names)}."
+        )
+    if len(set(names)) != len(names):
+        raise InvalidInputError(
+            f"two contacts share a name: {', '.join(names)}. Give each frame once, or name "
+            "the contacts apart with Contact(name=...)."
+        )
+    for contact in contacts:
+        if robot.frame(contact.frame).parentJoint == 0:
+            raise InvalidInputError(
+                f"frame {contact.frame!r} of contact {contact.name!r} is fixed in the world, not "
+                "part of the robot. Name a frame of a foot."
+            )
+    ends = np.cumsum([0] + [len(contact.components) for contact in contacts])
+    component = np.array([i for contact in contacts for i in contact.components])
+    owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
+    return _Layout(
+        names,
+        tuple(_attachment(robot, contact) for contact in contacts),
+        tuple(_plane_axes(c) if c.kind == "point" else None for c in contacts),
+        tuple(slice(int(a), int(b)) for a, b in pairwise(ends)),
+        tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in contacts for i in c.components),
+        read_only(component),
+        read_only(6 * owner + component),
+    )
+
+
+def _attachment(robot: Robot, contact: Contact) -> Attachment:
     """The joint that carries a contact, and the contact frame's placement on it."""
     frame = robot.frame(contact.frame)
     return int(frame.parentJoint), frame.placement * pin.SE3(
@@ -338,28 +418,31 @@ def _plane_axes(contact: Contact) -> Float[np.ndarray, "3 3"]:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def _check_planes(stance: Stance) -> None:
-    for contact, world in zip(stance.contacts, stance.placements, strict=True):
-        if contact.plane is None:
-            continue
-        normal = np.array(contact.plane.normal)
-        height = float(normal @ (world.translation - np.array(contact.plane.point)))
-        tilt = float(np.linalg.norm(np.cross(world.rotation[:, 2], normal)))
-        turned = contact.kind != "point" and (
-            tilt > ANGLE_TOLERANCE or world.rotation[:, 2] @ normal < 0
+def _check_plane(contact: Contact, foot: pin.SE3) -> None:
+    """Reject a contact frame that is not on its plane."""
+    if contact.plane is None:
+        return
+    # Written out: these few numbers would take NumPy longer than all of the kinematics.
+    (a, b, c), (px, py, pz) = contact.plane.normal, contact.plane.point
+    x, y, z = foot.translation.tolist()
+    u, v, w = foot.rotation[:, 2].tolist()
+    height = a * (x - px) + b * (y - py) + c * (z - pz)
+    along = a * u + b * v + c * w
+    tilt = math.hypot(v * c - w * b, w * a - u * c, u * b - v * a)
+    turned = contact.kind != "point" and (tilt > ANGLE_TOLERANCE or along < 0)
+    if abs(height) > POSITION_TOLERANCE or turned:
+        degrees = math.degrees(math.atan2(tilt, along))
+        raise ContactGeometryError(
+            f"contact {contact.name!r} is not on its plane: its origin is {height * 1e3:+.3f} "
+            f"mm off along the normal"
+            + ("" if contact.kind == "point" else f" and its z axis {degrees:.3f} deg away")
+            + ". Move the base or the joints (copsense.solve_posture places the feet), "
+            "correct the contact's offset or rotation, or drop its plane."
         )
-        if abs(height) > POSITION_TOLERANCE or turned:
-            degrees = np.degrees(np.arctan2(tilt, world.rotation[:, 2] @ normal))
-            raise ContactGeometryError(
-                f"contact {contact.name!r} is not on its plane: its origin is {height * 1e3:+.3f} "
-                f"mm off along the normal"
-                + ("" if contact.kind == "point" else f" and its z axis {degrees:.3f} deg away")
-                + ". Move the base or the joints (copsense.solve_posture places the feet), "
-                "correct the contact's offset or rotation, or drop its plane."
-            )
 
 
 def _check_support(stance: Stance) -> None:
+    """Reject contacts that cannot balance the base. A surface contact always can."""
     nb = stance.robot.base_nv
     base = stance.jacobian[:, :nb]
     rank = np.linalg.matrix_rank(base, tol=RANK_TOLERANCE * max(1.0, np.abs(base).max()))

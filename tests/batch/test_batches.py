@@ -125,6 +125,9 @@ def test_bad_requests_are_refused(case, many):
     made = kernel.empty(3)
     with pytest.raises(copsense.CopsenseError, match=r"out\.com is float32"):
         kernel.evaluate(q, out=replace(made, com=made.com.astype(np.float32)))
+    wrong = made.tipping_edge.astype(float)
+    with pytest.raises(copsense.CopsenseError, match=r"out\.tipping_edge is float64.*needs int64"):
+        kernel.evaluate(q, out=replace(made, tipping_edge=wrong))
     with pytest.raises(copsense.CopsenseError, match="number of postures is -1"):
         kernel.empty(-1)
     with pytest.raises(copsense.CopsenseError, match="criteria"):

@@ -44,6 +44,7 @@ def test_the_kernel_equals_the_clear_path(case, name):
                 "com_travel": clear.com_travel,
                 "load_share": clear.equilibrium.wrenches[:, 2] / stance.robot.weight,
             }
+            assert np.array_equal(found.tipping_edge[i, j], clear.tipping_edge)
             for what, value in pairs.items():
                 error = largest_error(getattr(found, what)[i, j][None, None], value[None, None])
                 assert error < RELATIVE, (what, i, criterion.name, error)

@@ -1,5 +1,6 @@
 """The real command in a process of its own: start-up, exit codes, signals, closed output."""
 
+import importlib
 import json
 import os
 import re
@@ -11,10 +12,13 @@ import pytest
 
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
-    "robots", "four-bar", "analyse", "sweep", "plot", "map", "design", "balance", "benchmark",
+    "robots", "analyse", "sweep", "plot", "map", "design", "balance", "benchmark", "four-bar",
     "reproduce",
 )  # fmt: skip
-HEAVY = {"matplotlib", "jinja2", "netCDF4", "mujoco", "icub_models", "numba", "zarr", "distributed"}
+HEAVY = {
+    "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",
+    "icub_models", "numba", "zarr", "distributed", "tqdm",
+}  # fmt: skip
 
 
 def run(*arguments, code=ENTRY, **options):
@@ -44,6 +48,21 @@ def test_help_of_every_command_shows_an_example_and_loads_no_robot_and_no_plots(
     assert heavy == []
     for name, text in texts.items():
         assert re.search(rf"Examples?: copsense {name}", " ".join(text.split())), name
+    assert list(texts) == list(importlib.import_module("copsense.cli").copsense.places)
+
+
+def test_the_group_lists_every_command_without_importing_it():
+    code = (
+        "import sys\n"
+        "from copsense.cli import copsense\n"
+        "copsense.main(['--help'], standalone_mode=False)\n"
+        "print([name for name in sys.modules if name.endswith('_command')])"
+    )
+    done = run(code=code)
+    assert done.returncode == 0, done.stderr
+    for name in COMMANDS:
+        assert re.search(rf"^  {name} +\w", done.stdout, re.MULTILINE), name
+    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_the_installed_command_is_this_one():
@@ -77,7 +96,7 @@ def test_ctrl_c_in_the_middle_of_a_sweep_leaves_no_file(tmp_path):
         "import importlib, itertools, signal\n"
         # A job in the background of a script is born deaf to it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-        "module = importlib.import_module('copsense.sweep')\n"
+        "module = importlib.import_module('copsense.sweeps')\n"
         "real, count = module.cop_sensitivity, itertools.count()\n"
         "def interrupted(*args):\n"
         "    if next(count) == 2: signal.raise_signal(signal.SIGINT)\n"

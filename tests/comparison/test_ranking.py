@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from copsense.comparison import agreement, rank_controllers, rank_scores
+from copsense.comparison.score_kinds import SCORES
 from copsense.comparison.table import COLUMNS
-from copsense.comparison.trials import SCORES
 
 
 def row(controller, value, half=0.0, *, score="tip_excursion", status="measured", **more):
@@ -88,6 +88,36 @@ def test_agreement_is_that_of_another_implementation():
     assert found["largest_error"] == pytest.approx(np.abs(value - predicted).max())
     assert found["correlation"] == pytest.approx(expected.statistic)
     assert (found["low"], found["high"]) == pytest.approx(tuple(interval))
+
+
+@pytest.mark.parametrize("count", [4, 11, 60])
+def test_a_correlation_has_fishers_interval(count):
+    random = np.random.default_rng(3)
+    x = random.standard_normal(count)
+    y = 0.8 * x + random.standard_normal(count)
+    rows = [
+        row("a", b, predicted=a, posture=str(i)) for i, (a, b) in enumerate(zip(x, y, strict=True))
+    ]
+    found = agreement(pd.DataFrame(rows)).iloc[0]
+    # Fisher 1915: the half width of atanh(r) is 1.96 / sqrt(n - 3).
+    z = np.arctanh(found["correlation"])
+    half = 1.959963984540054 / np.sqrt(count - 3)
+    assert (found["low"], found["high"]) == pytest.approx((np.tanh(z - half), np.tanh(z + half)))
+
+
+def test_a_perfect_correlation_and_one_of_three_cases_are_said_to_be_so():
+    rows = [row("a", float(i), predicted=float(i)) for i in range(5)]
+    found = agreement(pd.DataFrame(rows)).iloc[0]
+    assert (found["correlation"], found["low"], found["high"]) == pytest.approx((1.0, 1.0, 1.0))
+    three = agreement(pd.DataFrame(rows[:3])).iloc[0]
+    assert three["correlation"] == pytest.approx(1.0)
+    assert np.isnan(three["low"])
+    assert np.isnan(three["high"])
+
+
+def test_values_that_differ_by_rounding_have_no_correlation():
+    rows = [row("a", 1.0 + i * 1e-15, predicted=float(i)) for i in range(5)]
+    assert np.isnan(agreement(pd.DataFrame(rows)).iloc[0]["correlation"])
 
 
 def test_a_controller_of_ones_own_follows_a_law_of_its_own():

@@ -44,6 +44,7 @@ def test_rows_are_those_of_the_clear_path(whole, icub, both, sample):
                 "com": here.com,
             }.items():
                 assert np.allclose(found[name].values, value, rtol=NEAR, atol=NEAR), name
+            assert np.array_equal(found["tipping_edge"].values, expected.tipping_edge)
 
 
 def test_coordinates_are_where_the_postures_are(whole):
@@ -61,6 +62,8 @@ def test_a_posture_out_of_reach_is_a_row_with_its_reason(whole):
     assert (dataset["reason"].values == "")[~lost].all()
     assert np.isnan(dataset["com_travel"].values[lost]).all()
     assert np.isfinite(dataset["com_travel"].values[~lost]).all()
+    assert (dataset["tipping_edge"].values[lost] == -1).all()
+    assert (dataset["tipping_edge"].values[~lost] >= 0).all()
 
 
 def test_xarray_opens_the_store_by_itself(whole):
@@ -198,6 +201,17 @@ def test_lost_for_its_height_a_map_is_told_the_height_that_has_its_postures(icub
     assert not height_advice(icub, followed)
     assert not height_advice(icub, make({"com_y": (-0.01, 0.01)}))  # few are lost
     assert not height_advice(icub, make({"com_y": (5.0, 6.0)}))  # no height helps
+
+
+def test_the_summary_names_the_contact_and_the_edge_that_tip_first(whole):
+    dataset = copsense.load_map(whole[0])
+    for name, criterion in whole[1].criteria.items():
+        for worst in criterion.worst_travel:
+            here = dataset.sel(criterion=name).isel(posture=worst.posture)
+            k = list(here["contact"].values).index(worst.contact)
+            assert here["com_travel"].values[k] == np.float32(worst.value)
+            assert here["tipping_edge"].values[k] == worst.tipping_edge >= 0
+        assert {(w.contact, w.tipping_edge) for w in criterion.worst_gain} == {("", -1)}
 
 
 def test_the_summary_names_the_first_that_failed_and_why(whole):

@@ -13,6 +13,7 @@ import copsense
 from copsense import plots
 from copsense.cop import edge_margin
 from copsense.errors import InvalidInputError, OutputError
+from copsense.paper.report import paper_plots
 from copsense.plots.reading import cross_section, world_soles
 from copsense.plots.style import colours
 
@@ -261,7 +262,7 @@ def test_a_stance_needs_sensitivities_of_its_own(icub, stance_of):
 
 def test_figure_3b_marks_where_a_foot_unloads():
     _, torque, *_ = small_reproduction().four_bar_figures
-    ax = plots.plot_figure_3(torque, "minimum-torque")
+    ax = paper_plots.plot_figure_3(torque, "minimum-torque")
     poles = {
         round(float(line.get_xdata()[0]), 1)
         for line in ax.lines
@@ -272,7 +273,7 @@ def test_figure_3b_marks_where_a_foot_unloads():
 
 def test_figure_9_lays_the_four_bar_beneath_the_icub(lateral):
     wrench, torque, *_ = small_reproduction().four_bar_figures
-    ax = plots.plot_figure_9b(lateral, wrench, torque)
+    ax = paper_plots.plot_figure_9b(lateral, wrench, torque)
     rendered(ax)
     for bar, robot in zip(ax.lines[:2], ax.lines[4:6], strict=True):
         assert bar.get_color() == robot.get_color()
@@ -295,7 +296,7 @@ def ascending(line):
 @pytest.mark.parametrize("number", [2, 3])
 def test_figures_4_and_5_have_a_curve_per_criterion(number):
     data = small_reproduction().four_bar_figures[number]
-    ax = plots.plot_criteria_curves(data, "it", ceiling=30.0)
+    ax = paper_plots.plot_criteria_curves(data, "it", ceiling=30.0)
     assert ax.get_ylim() == (0.0, 30.0)
     assert len({line.get_color() for line in ax.lines}) >= 2
     rendered(ax)

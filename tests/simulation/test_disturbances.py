@@ -271,10 +271,10 @@ def test_a_foot_that_turns_on_the_spot_slips_too():
     import pinocchio as pin
 
     from copsense.simulation import Snapshot, Thresholds
-    from copsense.simulation.watch import Watch
+    from copsense.simulation.events import EventDetector
 
     stance, places = icub(), icub().placements
-    watch = Watch(stance, Thresholds(slip=5e-3))
+    watch = EventDetector(stance, Thresholds(slip=5e-3))
     corner = np.linalg.norm(stance.contacts[1].polygon, axis=1).max()
     for degrees, kind in ((2.0, None), (4.0, "slip")):
         turn = pin.utils.rpyToMatrix(0.0, 0.0, np.radians(degrees))

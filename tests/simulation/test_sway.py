@@ -9,9 +9,9 @@ from support.reproductions import small_reproduction
 
 import copsense
 from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel
-from copsense.report import report_figures, write_report
-from copsense.report.sway import score_rows, sway_runs
-from copsense.reproduction import LIMITS, sway_in_simulation
+from copsense.paper.report import report_figures, write_report
+from copsense.paper.report.closed_loop_section import score_rows, sway_runs
+from copsense.paper.reproduce import LIMITS, sway_in_simulation
 
 WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 

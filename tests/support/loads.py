@@ -22,6 +22,9 @@ def criteria(stance):
     # What a controller might ask for: more load on one foot, inwards forces, small moments.
     wanted = rng.uniform(-0.1, 0.1, (2, 6)) * weight + [[0, 0, 0.6 * weight, 0, 0, 0]] * 2
     inertia = copsense.weighted_torque("inverse inertia")
+    effort = stance.robot.effort_limits
+    # Where the model gives placeholders, the joints that have them cost nothing.
+    over = {j: float(t) ** -2 for j, t in zip(supporting, effort, strict=True) if np.isfinite(t)}
     cases = {
         "minimum wrench": wrench,
         "minimum wrench, short length": copsense.minimum_wrench(0.07),
@@ -29,7 +32,9 @@ def criteria(stance):
         "torque weights by joint": copsense.weighted_torque(supporting),
         "torque weights, diagonal": copsense.weighted_torque(rng.uniform(0.2, 3.0, n)),
         "torque weights, full": copsense.weighted_torque(random_spd(n, 1)),
-        "torque over limits": copsense.weighted_torque("1/limit^2"),
+        "torque over limits": copsense.weighted_torque(
+            "1/limit^2" if np.all(np.isfinite(effort)) else over
+        ),
         "inverse inertia": inertia,
         "inverse inertia and torque": copsense.mixed((inertia, 0.3), (torque, 2.0)),
         "tangential, then wrench": copsense.minimum_tangential(wrench),

@@ -2,11 +2,11 @@
 
 from functools import cache
 
-from copsense.reproduction import reproduce
+from copsense.paper.reproduce import reproduce_paper
 
 POSTURES = 21
 
 
 @cache
 def small_reproduction():
-    return reproduce(postures=POSTURES)
+    return reproduce_paper(postures=POSTURES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from copsense.batch.result import BatchResult, array_names
+from copsense.batch.result import BatchResult, array_names, nothing
 from copsense.contact import half_planes
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
@@ -37,11 +37,15 @@ def fill_row(
             "load_share": found.equilibrium.wrenches[:, 2] / stance.robot.weight,
         }
         if gains:
-            values |= {"com_gain": found.com_gain, "com_travel": found.com_travel}
+            values |= {
+                "com_gain": found.com_gain,
+                "com_travel": found.com_travel,
+                "tipping_edge": found.tipping_edge,
+            }
     except CopsenseError as error:
         for name in per_criterion:
             if len(getattr(result, name)):
-                getattr(result, name)[row, column] = np.nan
+                getattr(result, name)[row, column] = nothing(name)
         return str(error)
     for name, value in values.items():
         getattr(result, name)[row, column] = value

@@ -23,7 +23,7 @@ from copsense.arrays import finite_array, whole_number
 from copsense.batch.choice import choices
 from copsense.batch.clear import fill_row, sole_edges
 from copsense.batch.layout import layout, not_covered
-from copsense.batch.result import BatchResult, array_names, empty_result
+from copsense.batch.result import GAINS, BatchResult, array_names, empty_result
 from copsense.batch.rows import rows
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
@@ -65,7 +65,7 @@ class BatchKernel:
         self.names = tuple(names)
         self._single: Any = None
         self._nq = stance.robot.model.nq
-        self._shapes = {name: a.shape for name, a in _arrays(self.empty(0)).items()}
+        self._arrays = _arrays(self.empty(0))
         self._choices = choices(stance, self.criteria)
         self.fallback_reason = not_covered(stance.robot, tuple(stance.contacts))
         if not self.fallback_reason and importlib.util.find_spec("numba") is None:
@@ -201,13 +201,14 @@ class BatchKernel:
                 f"out is of type {type(out).__name__}. Make it with BatchKernel.empty({count})."
             )
         for name, array in _arrays(out).items():
-            first = 0 if name.startswith("com_") and not self.gains else count
-            shape = (first, *self._shapes[name][1:])
-            fits = array.shape == shape and array.dtype == np.float64
+            first = 0 if name in GAINS and not self.gains else count
+            shape = (first, *self._arrays[name].shape[1:])
+            wanted = self._arrays[name].dtype
+            fits = array.shape == shape and array.dtype == wanted
             if not (fits and array.flags.carray):
                 raise InvalidInputError(
                     f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
-                    f"writeable; the batch needs float64 of shape {shape}. Make it with "
+                    f"writeable; the batch needs {wanted} of shape {shape}. Make it with "
                     f"BatchKernel.empty({count})."
                 )
         if out.criteria != self.names:

@@ -21,6 +21,7 @@ from copsense.batch.rows import Rows
 from copsense.batch.vectors import cross3, load3
 
 _STILL = 1e-12  # gains under which nothing moves, as in `CopSensitivity`
+_ON_EDGE = 1e-9  # m: a centre of pressure this far off its sole is on the edge, likewise
 _FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways
 
 
@@ -118,43 +119,51 @@ def _normalise(tree: Tree, rows: Rows, W: Any, nv: int) -> None:
 
 
 @compiled
-def com_gains(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
+def com_gains(feet: Feet, rows: Rows, W: Any, nv: int) -> None:
     """Gamma (nc, 2, 2) of the gradients at hand, their base part still in world axes."""
-    nv = len(tree.parent) + 5
     for output in range(2 * len(feet.body)):
-        for e in range(2):
-            g, u = rows.gradient + nv * output, rows.motion + nv * e
-            s = load(W, g) * load(W, u)
-            for i in range(1, nv):
-                s = s + load(W, g + i) * load(W, u + i)
-            store(W, rows.gain + 2 * output + e, s)
+        along_motions(rows, W, rows.gradient + nv * output, rows.gain + 2 * output, nv)
+
+
+@compiled
+def along_motions(rows: Rows, W: Any, gradient: int, out: int, nv: int) -> None:
+    """Rates of a quantity of this gradient (nv,) per CoM x and y (2,)."""
+    for e in range(2):
+        u = rows.motion + nv * e
+        s = load(W, gradient) * load(W, u)
+        for i in range(1, nv):
+            s = s + load(W, gradient + i) * load(W, u + i)
+        store(W, out + e, s)
 
 
 @compiled
 def margins(feet: Feet, rows: Rows, W: Any, travel: bool) -> None:
-    """Distance to each sole's nearest edge; with `travel`, how far the CoM may move before it.
+    """Distance to each sole's nearest edge; with `travel`, how far the CoM may move before it tips.
 
-    The travel is the least margin / |a' Gamma| over the edges that Gamma moves the CoP towards or
-    from; an edge already passed that nothing moves makes it minus infinity.
+    The travel is the least s / |grad s| over the edges, with the slack s = w (b - a . p), w the
+    contact's share of the weight, and grad s = (b - a . p) grad w - w a' Gamma. An edge already
+    passed whose slack stands still makes it minus infinity. As `CopSensitivity.com_travel`.
     """
     for k in range(len(feet.body)):
         x, y = load(W, rows.cop + 2 * k), load(W, rows.cop + 2 * k + 1)
+        w = load(W, rows.contact_wrench + 6 * k + 2) / feet.weight
         least, free = splat(W, np.inf), splat(W, np.inf)
-        beyond = splat(W, 1.0)
+        nearest = splat(W, -1.0)
         for e in range(feet.edge_first[k], feet.edge_first[k + 1]):
             ax, ay, b = feet.edges[e, 0], feet.edges[e, 1], feet.edges[e, 2]
             margin = b - (ax * x + ay * y)
             least = where_less(margin, least, margin, least)
             if travel:
-                gain = rows.gain + 4 * k
+                gain, lift = rows.gain + 4 * k, rows.load_gain + 2 * k
                 u = ax * load(W, gain) + ay * load(W, gain + 2)
                 v = ax * load(W, gain + 1) + ay * load(W, gain + 3)
-                speed = root(u * u + v * v)
-                distance = where_less(_STILL, speed, margin / speed, splat(W, np.inf))
+                u, v = margin * load(W, lift) - w * u, margin * load(W, lift + 1) - w * v
+                slack, speed = w * margin, root(u * u + v * v)
+                still = where_less(slack, -_ON_EDGE, splat(W, -np.inf), splat(W, np.inf))
+                distance = where_less(_STILL, speed, slack / speed, still)
+                nearest = where_less(distance, free, 1.0 * (e - feet.edge_first[k]), nearest)
                 free = where_less(distance, free, distance, free)
-                lost = where_less(margin, 0.0, splat(W, -1.0), splat(W, 1.0))
-                lost = where_less(_STILL, speed, splat(W, 1.0), lost)
-                beyond = where_less(lost, beyond, lost, beyond)
         store(W, rows.margin + k, least)
         if travel:
-            store(W, rows.travel + k, where_less(beyond, 0.0, splat(W, -np.inf), free))
+            store(W, rows.travel + k, free)
+            store(W, rows.edge + k, nearest)

@@ -19,6 +19,7 @@ from __future__ import annotations
 from typing import Any
 
 from copsense.batch.choice import WEIGHTED, Choices
+from copsense.batch.gains import along_motions
 from copsense.batch.kinematics import screw_cross
 from copsense.batch.lanes import compiled, load, splat, store
 from copsense.batch.layout import PRISMATIC, Feet, Tree
@@ -28,13 +29,16 @@ from copsense.batch.sharing import across_symmetric
 from copsense.batch.tangents import project, store_base
 from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, store3, sub3
 
+LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight
+
 
 @compiled
-def wrench_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any, arm: float) -> None:
+def wrench_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any, arm: float, gains: bool) -> None:
     """Gradients under the minimum wrench, which follow the centre of mass alone.
 
     dp = beta . dM_c with dM_c = -dh x g, so dp = dh . (beta x g); for p_x (p_y alike, with x)
-    beta = I^-1 (-L^2 y - p_x (rho x z)) / f_z.
+    beta = I^-1 (-L^2 y - p_x (rho x z)) / f_z, for the contact's share of the weight, which only
+    the gains need, beta = I^-1 (rho x z) / (m g).
     """
     nv = len(tree.parent) + 5
     g = (splat(W, tree.gravity[0]), splat(W, tree.gravity[1]), splat(W, tree.gravity[2]))
@@ -47,16 +51,29 @@ def wrench_gradients(tree: Tree, feet: Feet, rows: Rows, W: Any, arm: float) -> 
         z = load3(W, axes + 6)
         lean = cross3(sub3(load3(W, rows.foot + 3 * k), load3(W, rows.middle)), z)
         share = 1.0 / load(W, rows.contact_wrench + 6 * k + 2)
-        for axis in range(2):
-            p = load(W, rows.cop + 2 * k + axis)
-            own = scale3(-arm, load3(W, axes + 3)) if axis == 0 else scale3(arm, load3(W, axes))
-            beta = across_symmetric(W, rows.middle + 3, scale3(share, sub3(own, scale3(p, lean))))
-            u = cross3(beta, g)
+        for output in range(_outputs(feet, k, gains)):
+            if output == LOAD:
+                v = scale3(1.0 / feet.weight, lean)
+            else:
+                p = load(W, rows.cop + 2 * k + output)
+                own = scale3(arm, load3(W, axes))
+                if output == 0:
+                    own = scale3(-arm, load3(W, axes + 3))
+                v = scale3(share, sub3(own, scale3(p, lean)))
+            u = cross3(across_symmetric(W, rows.middle + 3, v), g)
             a = u[0] * first[0] + u[1] * first[1] + u[2] * first[2]
             b = u[0] * second[0] + u[1] * second[1] + u[2] * second[2]
-            at = rows.gradient + nv * (2 * k + axis)
+            at = rows.load_gradient if output == LOAD else rows.gradient + nv * (2 * k + output)
             for i in range(nv):
                 store(W, at + i, a * load(W, rows.level + i) + b * load(W, rows.level + nv + i))
+            if output == LOAD:
+                along_motions(rows, W, at, rows.load_gain + 2 * k, nv)
+
+
+@compiled
+def _outputs(feet: Feet, k: int, gains: bool) -> int:
+    """How many gradients a surface contact has: its share of the weight where it may tip."""
+    return 3 if gains and feet.edge_first[k] < feet.edge_first[k + 1] else 2
 
 
 @compiled
@@ -68,7 +85,7 @@ def _stand_still(rows: Rows, W: Any, k: int, nv: int) -> None:
 
 @compiled
 def torque_gradients(
-    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int
+    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, gains: bool
 ) -> None:
     """Gradients under a criterion of weighted torques, and wrenches."""
     nv = len(tree.parent) + 5
@@ -77,11 +94,17 @@ def torque_gradients(
         if feet.point[k]:
             _stand_still(rows, W, k, nv)
             continue
-        for axis in range(2):
-            at = rows.gradient + nv * (2 * k + axis)
-            _adjoint(tree, feet, rows, W, choices, index, k, axis)
+        for output in range(_outputs(feet, k, gains)):
+            at = rows.load_gradient if output == LOAD else rows.gradient + nv * (2 * k + output)
+            _adjoint(tree, feet, rows, W, choices, index, k, output)
             _sweep(tree, feet, rows, W, choices, index, at)
-            project(feet, rows, W, at, rows.felt)
+            if output == LOAD:
+                # The motions it meets are admissible: nothing has to be projected.
+                for t in range(len(feet.support)):
+                    store(W, at + 5 + feet.support[t], load(W, rows.felt + t))
+                along_motions(rows, W, at, rows.load_gain + 2 * k, nv)
+            else:
+                project(feet, rows, W, at, rows.felt)
 
 
 @compiled
@@ -95,19 +118,25 @@ def _lever_arms(tree: Tree, feet: Feet, rows: Rows, W: Any) -> None:
 
 
 @compiled
-def _covector(rows: Rows, W: Any, k: int, axis: int) -> Any:
-    """l of p_x = -m_y / f_z or p_y = m_x / f_z, on the wrench about the base's origin."""
+def _covector(feet: Feet, rows: Rows, W: Any, k: int, output: int) -> Any:
+    """l of p_x = -m_y / f_z, p_y = m_x / f_z or f_z / (m g), on the wrench about the base's origin.
+
+    The first two give the change of a quotient: -p / f_z times that of f_z, and the moment's.
+    """
     axes = rows.foot_rotation + 9 * k
+    if output == LOAD:
+        zero = splat(W, 0.0)
+        return scale3(1.0 / feet.weight, load3(W, axes + 6)), (zero, zero, zero)
     share = 1.0 / load(W, rows.contact_wrench + 6 * k + 2)
-    p = load(W, rows.cop + 2 * k + axis)
+    p = load(W, rows.cop + 2 * k + output)
     force = scale3(-(p * share), load3(W, axes + 6))
-    moment = scale3(-share, load3(W, axes + 3)) if axis == 0 else scale3(share, load3(W, axes))
+    moment = scale3(-share, load3(W, axes + 3)) if output == 0 else scale3(share, load3(W, axes))
     return add3(force, cross3(load3(W, rows.foot + 3 * k), moment)), moment
 
 
 @compiled
 def _adjoint(
-    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, k: int, axis: int
+    tree: Tree, feet: Feet, rows: Rows, W: Any, choices: Choices, index: int, k: int, output: int
 ) -> None:
     """mu (into `inner`) and xi (into `twist`) of one output.
 
@@ -115,7 +144,7 @@ def _adjoint(
     """
     ns, r, held = len(feet.support), feet.unknowns, feet.order[0]
     weighted = choices.kind[index] == WEIGHTED
-    v, w = _covector(rows, W, k, axis)
+    v, w = _covector(feet, rows, W, k, output)
     for j in range(r):
         store(W, rows.unknown + j, splat(W, 0.0))
     for e in feet.order[1:]:

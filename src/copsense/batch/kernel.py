@@ -34,6 +34,7 @@ class Out(NamedTuple):
     gradient: np.ndarray
     com_gain: np.ndarray
     com_travel: np.ndarray
+    tipping_edge: np.ndarray
     margin: np.ndarray
     load_share: np.ndarray
     com: np.ndarray
@@ -76,13 +77,13 @@ def run(
                 arm = choices.force[index] / choices.moment[index]
                 least_wrench(feet, rows, W, arm)
                 finish(tree, feet, rows, W)
-                wrench_gradients(tree, feet, rows, W, arm)
+                wrench_gradients(tree, feet, rows, W, arm, gains)
             else:
                 least_squares(feet, rows, W, choices, index)
                 finish(tree, feet, rows, W)
-                torque_gradients(tree, feet, rows, W, choices, index)
+                torque_gradients(tree, feet, rows, W, choices, index, gains)
             if gains:
-                com_gains(tree, feet, rows, W)
+                com_gains(feet, rows, W, nv)
             margins(feet, rows, W, gains)
             for output in range(2 * nc):
                 at = rows.gradient + nv * output
@@ -102,6 +103,9 @@ def run(
                 for k in range(nc):
                     share = get(W, rows.contact_wrench + 6 * k + 2, lane) / feet.weight
                     out.load_share[row, column, k] = share
+                    if gains:
+                        edge = int(get(W, rows.edge + k, lane))
+                        out.tipping_edge[row, column, k] = edge
                 out.doubtful[row, column] = get(W, rows.doubt, lane) != 0.0
         mass = tree.carried[0]
         for lane in range(count):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from copsense.stance import Stance
 
@@ -29,6 +29,8 @@ class BatchResult:
         com_gain: d cop / d CoM, as `CopSensitivity.com_gain`; empty where not asked for.
         com_travel: first-order distance of the CoM to tipping, as `CopSensitivity.com_travel` [m];
             empty where not asked for.
+        tipping_edge: index of the sole's edge that it goes to, as `CopSensitivity.tipping_edge`; -1
+            where it goes to none, empty where not asked for.
         margin: signed distance of each CoP to its sole's nearest edge [m]; infinite without a sole.
         load_share: f_z / (m g) of each contact.
         com: centre of mass in the world [m].
@@ -43,6 +45,7 @@ class BatchResult:
     gradient: Float[np.ndarray, "N nk nc 2 nv"]
     com_gain: Float[np.ndarray, "G nk nc 2 2"]
     com_travel: Float[np.ndarray, "G nk nc"]
+    tipping_edge: Int[np.ndarray, "G nk nc"]
     margin: Float[np.ndarray, "N nk nc"]
     load_share: Float[np.ndarray, "N nk nc"]
     com: Float[np.ndarray, "N 3"]
@@ -56,6 +59,15 @@ class BatchResult:
     def nbytes(self) -> int:
         """Size of all arrays [B]."""
         return sum(getattr(self, name).nbytes for name in array_names())
+
+
+GAINS = ("com_gain", "com_travel", "tipping_edge")
+"""Arrays that a batch fills only where it is asked for them."""
+
+
+def nothing(name: str) -> float:
+    """What an array holds where there is no answer."""
+    return -1 if name == "tipping_edge" else np.nan
 
 
 def array_names() -> tuple[str, ...]:
@@ -78,9 +90,10 @@ def empty_result(
         "gradient": (count, nk, nc, 2, nv),
         "com_gain": (counted, nk, nc, 2, 2),
         "com_travel": (counted, nk, nc),
+        "tipping_edge": (counted, nk, nc),
         "margin": (count, nk, nc),
         "load_share": (count, nk, nc),
         "com": (count, 3),
     }
-    arrays: dict[str, Any] = {name: np.full(shape, np.nan) for name, shape in shapes.items()}
+    arrays: dict[str, Any] = {name: np.full(shape, nothing(name)) for name, shape in shapes.items()}
     return BatchResult(criteria, stance.contact_names, **arrays)

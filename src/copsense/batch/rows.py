@@ -65,8 +65,11 @@ class Rows(NamedTuple):
         RY: its triangular factor (r + 6, r + 6).
         motion: of unit CoM velocity along x and y (2, nv).
         gain: Gamma (nc, 2, 2).
+        load_gradient: of a contact's share of the weight (nv,).
+        load_gain: its change per CoM x and y (nc, 2).
         margin: distance of each CoP to its sole's edge (nc,).
         travel: of the CoM before a contact tips (nc,).
+        edge: the sole's edge it tips over (nc,).
         size: rows in all.
     """
 
@@ -122,8 +125,11 @@ class Rows(NamedTuple):
     RY: int
     motion: int
     gain: int
+    load_gradient: int
+    load_gain: int
     margin: int
     travel: int
+    edge: int
     size: int
 
 
@@ -185,8 +191,11 @@ def rows(layout: Layout, nq: int) -> Rows:
         "RY": (r + 6) * (r + 6),
         "motion": 2 * nv,
         "gain": 4 * nc,
+        "load_gradient": nv,
+        "load_gain": 2 * nc,
         "margin": nc,
         "travel": nc,
+        "edge": nc,
     }
     starts, end = {}, 0
     for name, size in sizes.items():

@@ -42,7 +42,7 @@ class Single:
     ) -> None:
         """Pack what does not change, and let the results share one array."""
         ints, floats = pack(layout, choices, rows, gains, len(empty.criteria))
-        names, nk = array_names(), len(empty.criteria)
+        names, nk = [n for n in array_names() if n != "tipping_edge"], len(empty.criteria)
         arrays = [getattr(empty, name) for name in names]
         values = np.concatenate([*[a.ravel() for a in arrays], np.ones(nk)])
         ends = np.cumsum([0] + [a.size for a in arrays])
@@ -53,7 +53,8 @@ class Single:
         self.result = replace(empty, **views)
         self.doubtful = values[ends[-1] :]
         self._q = np.zeros(nq)
-        self._memory = (ints, floats, self._q, values, workspace(rows.size, width=1))
+        edges = self.result.tipping_edge
+        self._memory = (ints, floats, self._q, values, edges, workspace(rows.size, width=1))
         self._places = [number for a in self._memory for number in (a.ctypes.data, a.size)]
 
     def evaluate(self, q: np.ndarray) -> bool:
@@ -102,6 +103,8 @@ def run_single(
     q_size: int,
     values_at: int,
     values_size: int,
+    edges_at: int,
+    edges_size: int,
     W_at: int,
     W_size: int,
 ) -> bool:
@@ -126,6 +129,7 @@ def run_single(
         ints[7],
         ints[8],
     )
+    tipped = whole_at(edges_at, edges_size)
     nr, i = ints[9], 10
     parent, kind, column = ints[i : i + b], ints[i + b : i + 2 * b], ints[i + 2 * b : i + 3 * b]
     i += 3 * b
@@ -192,6 +196,7 @@ def run_single(
         values[a2:a3].reshape(1, nr, 2 * nc * nv),
         values[a3:a4].reshape(gains, nr, 4 * nc),
         values[a4:a5].reshape(gains, nr, nc),
+        tipped.reshape(gains, nr, nc),
         values[a5:a6].reshape(1, nr, nc),
         values[a6:a7].reshape(1, nr, nc),
         values[a7 : a7 + 3].reshape(1, 3),

@@ -1,36 +1,50 @@
 """The command line: arguments in, results out, exit code 0 done, 1 some rows failed, 2 bad usage.
 
-Commands import what they need when they run, so that help is immediate.
+Commands parse and print; what they print is computed by functions that any Python program can
+call. A command is imported when it runs, and NumPy, Pinocchio and the rest when it computes.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from typing import Any
 
 import click
-from threadpoolctl import threadpool_limits
 
 from copsense._version import __version__
-from copsense.cli.analyse import analyse
-from copsense.cli.balance import balance
-from copsense.cli.benchmark import benchmark
-from copsense.cli.design import design
-from copsense.cli.four_bar import four_bar
-from copsense.cli.map import map_command
-from copsense.cli.reproduce import reproduce
-from copsense.cli.robots import robots
-from copsense.cli.sweep import plot, sweep
+from copsense.cli.lazy_group import LazyGroup, Place
 from copsense.errors import CopsenseError
+
+_COMMANDS = {
+    name: Place(f"copsense.cli.{name.replace('-', '_')}_command", function, summary)
+    for name, function, summary in (
+        ("robots", "robots", "List the robots known by name."),
+        ("analyse", "analyse", "Analyse one posture: CoP, margin and sensitivity of each contact."),
+        ("sweep", "sweep", "Sweep the CoM or a joint and evaluate every posture."),
+        ("plot", "plot", "Draw a sweep that `copsense sweep` wrote."),
+        ("map", "map_command", "Map the sensitivity over a whole space of postures."),
+        ("design", "design", "Design the weights of a criterion that goes farther."),
+        ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
+        ("benchmark", "benchmark", "Compare balancing controllers in simulation."),
+        ("four-bar", "four_bar", "Solve the paper's four-bar linkage in closed form."),
+        ("reproduce", "reproduce", "Reproduce the paper and write a report."),
+    )
+}
 
 
 @click.group(
+    cls=LazyGroup,
+    places=_COMMANDS,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 done, 1 some rows failed, 2 bad usage or input. "
-    "Each command's --help shows an example.",
+    epilog="\b\nExamples:\n"
+    "  copsense analyse icub --com-y 0.03\n"
+    "  copsense sweep icub --com-y -0.07:0.07:57 --output icub.nc\n"
+    "Each command's --help shows examples of its own.\n"
+    "Exit codes: 0 done, 1 some rows failed, 2 bad usage or input.",
 )
-@click.version_option(__version__, prog_name="copsense")
+@click.version_option(__version__, "-V", "--version", prog_name="copsense")
 def copsense() -> None:
     """How fast does the centre of pressure under each foot move when the posture does?
 
@@ -38,24 +52,13 @@ def copsense() -> None:
     """
 
 
-for _command in (
-    robots,
-    four_bar,
-    analyse,
-    sweep,
-    plot,
-    map_command,
-    design,
-    balance,
-    benchmark,
-    reproduce,
-):
-    copsense.add_command(_command)
-
-
 def main() -> None:
     """Run the command line; an error of copsense is a line, not a traceback."""
     warnings.showwarning = _show_warning
+    # The matrices are small: more BLAS threads than one cost more than they bring. Read when NumPy
+    # is first imported, which is after this.
+    for variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+        os.environ.setdefault(variable, "1")
     try:
         code = _run()
         sys.stdout.flush()
@@ -68,7 +71,7 @@ def main() -> None:
         click.echo("stopped; nothing half-written is left behind.", err=True)
         sys.exit(130)
     except BrokenPipeError:
-        sys.stderr.close()  # whoever read our output has seen enough
+        sys.stderr.close()  # the reader of our output has seen enough
         sys.exit(0)
     except OSError as error:
         # Standard output: files have errors of their own.
@@ -78,11 +81,9 @@ def main() -> None:
 
 def _run() -> int:
     try:
-        # The matrices are small: more BLAS threads than one cost more than they bring.
-        with threadpool_limits(limits=1, user_api="blas"):
-            return copsense.main(standalone_mode=False) or 0
+        return copsense.main(standalone_mode=False) or 0
     except SystemExit:
-        return 0  # click leaves so when whoever read our output has seen enough
+        return 0  # click leaves so when the reader of our output has seen enough
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -7,26 +7,16 @@ controllers by what physics says. Falls are scored with limits only, as a rate o
 repeats: without limits they follow chance more than the criterion.
 """
 
-from copsense.comparison.cases import Case, Conditions, ControllerChoice, PostureChoice, RobotChoice
-from copsense.comparison.intervals import fisher_interval, wilson_interval
-from copsense.comparison.plan import make_plan, read_plan
-from copsense.comparison.prediction import predict_impulse
+from copsense.comparison.benchmark_run import run_benchmark, run_case
+from copsense.comparison.case import Case, make_plan
+from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
+from copsense.comparison.plan_file import read_plan
 from copsense.comparison.ranking import CAVEAT, agreement, rank_controllers, rank_scores
-from copsense.comparison.run import run_benchmark, run_case
 from copsense.comparison.score import Score
+from copsense.comparison.score_kinds import SCORES, ScoreKind, shown_unit
 from copsense.comparison.table import load_benchmark
-from copsense.comparison.trials import (
-    SCORES,
-    Breaking,
-    Falls,
-    Lean,
-    PushToTip,
-    Rest,
-    ScoreKind,
-    Sway,
-    Trial,
-    shown_unit,
-)
+from copsense.comparison.trials import Breaking, Falls, Lean, PushToTip, Rest, Sway, Trial
+from copsense.simulation.prediction import predict_impulse
 
 __all__ = [
     "CAVEAT",
@@ -46,7 +36,6 @@ __all__ = [
     "Sway",
     "Trial",
     "agreement",
-    "fisher_interval",
     "load_benchmark",
     "make_plan",
     "predict_impulse",
@@ -56,5 +45,4 @@ __all__ = [
     "run_benchmark",
     "run_case",
     "shown_unit",
-    "wilson_interval",
 ]

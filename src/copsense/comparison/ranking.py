@@ -7,8 +7,7 @@ import json
 import numpy as np
 import pandas as pd
 
-from copsense.comparison.intervals import fisher_interval
-from copsense.comparison.trials import SCORES
+from copsense.comparison.score_kinds import SCORES
 
 CAVEAT = (
     "Prediction and controller share the law that shares the load: the agreement holds the theory "
@@ -17,6 +16,7 @@ CAVEAT = (
 """To be said wherever the agreement is."""
 
 _SETTING = ["robot", "posture", "conditions", "trial", "score"]
+_SAME = 1e-9  # relative spread below which values are taken as one
 # Scores that tell theory from physics; the others have no prediction, or one of zero.
 _COMPARED = (
     "tip_excursion",
@@ -118,10 +118,7 @@ def agreement(table: pd.DataFrame) -> pd.DataFrame:
                 continue
             x, y = known[column].to_numpy(float), known["value"].to_numpy(float)
             error = np.abs(y - x)
-            r = np.nan
-            if len(known) > 2 and np.ptp(x) > 0 and np.ptp(y) > 0:
-                r = float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
-            low, high = fisher_interval(r, len(known))
+            r, low, high = _correlation(x, y)
             rows.append(
                 {
                     "score": score,
@@ -137,3 +134,16 @@ def agreement(table: pd.DataFrame) -> pd.DataFrame:
             )
     columns = ["score", "unit", "prediction", "cases", "mean_error", "largest_error"]
     return pd.DataFrame(rows, columns=[*columns, "correlation", "low", "high"])
+
+
+def _correlation(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:
+    """Pearson's r and the ends of its 95 % interval; NaN for too few values, or one repeated."""
+    from scipy.stats import pearsonr
+
+    r = low = high = np.nan
+    if len(x) > 2 and all(np.ptp(values) > _SAME * np.abs(values).max() for values in (x, y)):
+        found = pearsonr(x, y)
+        r = float(found.statistic)
+        if len(x) > 3:  # Fisher's z has 1 / sqrt(n - 3)
+            low, high = map(float, found.confidence_interval(0.95))
+    return r, low, high

@@ -13,9 +13,9 @@ from typing import Any
 
 import pandas as pd
 
-from copsense.comparison.cases import Case
+from copsense.comparison.case import Case
 from copsense.comparison.score import Score
-from copsense.comparison.trials import SCORES
+from copsense.comparison.score_kinds import SCORES
 from copsense.errors import InvalidInputError
 from copsense.storage import write_beside
 

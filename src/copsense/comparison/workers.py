@@ -12,7 +12,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from copsense.comparison.cases import Case
+from copsense.comparison.case import Case
 from copsense.comparison.score import Score, failed
 
 # The matrices are small: more threads than one cost more than they bring, and change sums' order.

@@ -4,7 +4,7 @@ from copsense.controllers.balancing import BalancingController
 from copsense.controllers.controller import Command, Controller, Observation, controller_name
 from copsense.controllers.gains import STIFF, Gains, public_gains
 from copsense.controllers.limited import ShareWithinLimits
-from copsense.controllers.own import controller_code, load_controller
+from copsense.controllers.loading import controller_code, load_controller
 from copsense.controllers.sharing import LoadProblem, ShareByCriterion, ShareLoad
 from copsense.controllers.target import (
     Hold,

@@ -59,6 +59,12 @@ _COLUMNS = {
         "m",
         "the same distance for each contact",
     ),
+    "tipping_edge": Column(
+        (*_EACH, "contact"),
+        "int16",
+        "",
+        "index of the sole's edge that com_travel goes to; -1 where it goes to none",
+    ),
     "com_gain": Column(
         (*_EACH, "contact", "axis", "com_direction"),
         "float32",
@@ -134,4 +140,4 @@ def limit_kinds(table: MarginTable) -> tuple[str, ...]:
 
 def fill_value(column: Column) -> Any:
     """What an array holds where nothing was written yet."""
-    return {"str": "", "uint8": PENDING}.get(column.dtype, np.nan)
+    return {"str": "", "uint8": PENDING, "int16": -1, "int64": -1}.get(column.dtype, np.nan)

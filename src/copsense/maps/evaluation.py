@@ -14,6 +14,7 @@ from copsense.maps.columns import (
     UNSOLVED,
     columns,
     coordinate_columns,
+    fill_value,
     limit_kinds,
 )
 from copsense.maps.plan import MapPlan
@@ -56,6 +57,7 @@ class ChunkEvaluator:
             "least_com_travel": result.com_travel.min(axis=-1),
             "largest_com_gain": _largest_singular_value(result.com_gain).max(axis=-1),
             "com_travel": result.com_travel,
+            "tipping_edge": result.tipping_edge,
             "com_gain": result.com_gain,
             "cop": result.cops,
             "margin": result.margin,
@@ -69,7 +71,8 @@ class ChunkEvaluator:
         found: Chunk = dict(zip(self._names, np.ascontiguousarray(values.T), strict=True))
         found |= {"status": status, "reason": reason}
         for name, array in wide.items():
-            rows = np.full((stop - start, *array.shape[1:]), np.nan, self._columns[name].dtype)
+            column = self._columns[name]
+            rows = np.full((stop - start, *array.shape[1:]), fill_value(column), column.dtype)
             rows[there] = array
             found[name] = rows
         if self.plan.configurations:

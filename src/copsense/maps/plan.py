@@ -19,7 +19,7 @@ from copsense.limits import Limits
 from copsense.maps.sampling import Sampling
 from copsense.stance import Stance
 
-LAYOUT = 1  # of the store; counted up when what is written changes
+LAYOUT = 2  # of the store; counted up when what is written changes
 _SAME = 1e-9  # by which numbers of one stance may differ between machines
 _LISTED = 5  # differences that an error names
 

@@ -78,6 +78,11 @@ class MapStore:
         """Names of the criteria."""
         return tuple(c["name"] for c in self.parameters["criteria"])
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Names of the contacts."""
+        return tuple(c["name"] for c in self.parameters["contacts"])
+
     def units(self, column: str) -> str:
         """Units of a column."""
         return str(self._arrays[column].attrs.get("units", ""))
@@ -270,11 +275,11 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
             shape=tuple(sizes[d] for d in column.dims),
             chunks=chunks,
             dtype=str if column.dtype == "str" else column.dtype,
-            fill_value=fill_value(column) if column.dtype != "int64" else -1,
+            fill_value=fill_value(column),
             dimension_names=column.dims,
             attributes=attributes,
             # Noise in the last bits: compressing a float costs more than it saves.
-            compressors="auto" if column.dtype in ("str", "int64", "uint8") else None,
+            compressors=None if column.dtype.startswith("float") else "auto",
         )
 
     for name, column in columns(plan).items():

@@ -22,11 +22,15 @@ class WorstPosture:
         posture: its number.
         coordinates: where it is, by name [m, rad].
         value: of the quantity there [m, or 1 for a gain].
+        contact: the contact that tips first there; empty for a gain, and where none can tip.
+        tipping_edge: index of its sole's edge that it tips over; -1 likewise.
     """
 
     posture: int
     coordinates: Mapping[str, float]
     value: float
+    contact: str = ""
+    tipping_edge: int = -1
 
 
 @dataclass(frozen=True)
@@ -126,7 +130,9 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
             counts = total.counts[j]
             for k, name in enumerate(QUANTITIES):
                 rows = zip(total.worst[k, j], total.values[k, j], strict=True)
-                worst[name] = tuple(_posture(store, int(p), float(v)) for p, v in rows if p >= 0)
+                worst[name] = tuple(
+                    _posture(store, name, j, int(p), float(v)) for p, v in rows if p >= 0
+                )
         travel, gain = (dict(zip(LEVELS, row.tolist(), strict=True)) for row in levels[:, j])
         criteria[criterion] = CriterionSummary(
             dict(zip(STATUS, counts.tolist(), strict=True)),
@@ -159,8 +165,16 @@ def _rows(store: MapStore, first: int, end: int, take: Callable[[np.ndarray], ob
     return len(block)
 
 
-def _posture(store: MapStore, row: int, value: float) -> WorstPosture:
-    return WorstPosture(row, _place(store, row), value)
+def _posture(
+    store: MapStore, quantity: str, criterion: int, row: int, value: float
+) -> WorstPosture:
+    if quantity != "least_com_travel":
+        return WorstPosture(row, _place(store, row), value)
+    travel = store.read("com_travel", row, row + 1)[0, criterion]
+    contact = int(np.argmin(travel))
+    edge = int(store.read("tipping_edge", row, row + 1)[0, criterion, contact])
+    name = store.contacts[contact] if edge >= 0 else ""
+    return WorstPosture(row, _place(store, row), value, name, edge)
 
 
 def _failed(store: MapStore, chunk: int, criterion: int, code: int) -> FailedPosture:

@@ -6,7 +6,7 @@ Criterion to assess Contact Stability and Balancing Controllers", arXiv:1610.014
 
 from __future__ import annotations
 
-from copsense.paper.claim import (
+from copsense.paper.claims.claim import (
     CheckedClaim,
     Claim,
     EvaluatedClaim,
@@ -15,12 +15,23 @@ from copsense.paper.claim import (
     evaluate_claims,
     judge,
 )
-from copsense.paper.claims import FOUR_BAR_CLAIMS, evaluate_four_bar_claims
-from copsense.paper.comparison import Discrepancy
-from copsense.paper.criteria import FOUR_BAR_CRITERIA, FourBarCriterion, solve_four_bar
-from copsense.paper.errata import ERRATA, Erratum, EvaluatedErratum, evaluate_errata
-from copsense.paper.family import FourBarSolution, solve_four_bar_member
-from copsense.paper.figures import (
+from copsense.paper.claims.closed_loop_claims import SWAY_CLAIMS, evaluate_sway_claims
+from copsense.paper.claims.four_bar_claims import FOUR_BAR_CLAIMS, evaluate_four_bar_claims
+from copsense.paper.claims.icub_claims import ICUB_CLAIMS, evaluate_icub_claims
+from copsense.paper.claims.icub_sweep import LateralSweep, Series
+from copsense.paper.claims.reference_values import ReferenceValue, compare_with_reference
+from copsense.paper.claims.sway_runs import (
+    Stretch,
+    Sway,
+    completed,
+    stretch,
+    tip_travel,
+    tracking_error,
+)
+from copsense.paper.closed_form.dimensions import FourBar
+from copsense.paper.closed_form.discrepancy import Discrepancy
+from copsense.paper.closed_form.family import FourBarSolution, solve_four_bar_member
+from copsense.paper.closed_form.figure_data import (
     Curve,
     FigureData,
     Sampling,
@@ -30,14 +41,14 @@ from copsense.paper.figures import (
     figure_4,
     figure_5,
 )
-from copsense.paper.four_bar import FourBar
-from copsense.paper.icub_claims import ICUB_CLAIMS, evaluate_icub_claims
-from copsense.paper.icub_reference import ReferenceValue, compare_with_reference
-from copsense.paper.lateral import LateralSweep, Series
-from copsense.paper.linkage import Hand
-from copsense.paper.printed import PRINTED_FORMS, PrintedForm
-from copsense.paper.sway import Stretch, Sway, completed, stretch, tip_travel, tracking_error
-from copsense.paper.sway_claims import SWAY_CLAIMS, evaluate_sway_claims
+from copsense.paper.closed_form.four_bar_criteria import (
+    FOUR_BAR_CRITERIA,
+    FourBarCriterion,
+    solve_four_bar,
+)
+from copsense.paper.closed_form.linkage import Hand
+from copsense.paper.closed_form.printed import PRINTED_FORMS, PrintedForm
+from copsense.paper.errata.errata_table import ERRATA, Erratum, EvaluatedErratum, evaluate_errata
 
 __all__ = [
     "ERRATA",

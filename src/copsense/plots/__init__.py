@@ -1,7 +1,7 @@
 """Figures of results; they draw and compute nothing.
 
-Functions take a sweep (or what `cop_sensitivity` or the paper's tables give) and return Axes, or a
-Figure where they need several. No window is opened and no figure is kept in a global state.
+Functions take a sweep (or what `cop_sensitivity` gives) and return Axes, or a Figure where they
+need several. No window is opened and no figure is kept in a global state.
 """
 
 from __future__ import annotations
@@ -18,33 +18,16 @@ from copsense.plots.curves import (
 from copsense.plots.design import plot_design
 from copsense.plots.limits import plot_limit_margins, plot_limited, plot_regions
 from copsense.plots.maps import plot_map
-from copsense.plots.paper import (
-    plot_criteria_curves,
-    plot_figure_3,
-    plot_figure_9a,
-    plot_figure_9b,
-    plot_unit_of_length,
-)
 from copsense.plots.rollout import plot_rollout
 from copsense.plots.saving import render_figure, save_figure
 from copsense.plots.soles import plot_soles
 from copsense.plots.stance import plot_stance
 from copsense.plots.summary import plot_results
-from copsense.plots.sway import (
-    plot_sway_cop,
-    plot_sway_hip_roll,
-    plot_sway_limits,
-    plot_sway_load,
-)
 
 __all__ = [
     "plot_benchmark",
     "plot_cop",
-    "plot_criteria_curves",
     "plot_design",
-    "plot_figure_3",
-    "plot_figure_9a",
-    "plot_figure_9b",
     "plot_foot_cop",
     "plot_limit_margins",
     "plot_limited",
@@ -57,13 +40,8 @@ __all__ = [
     "plot_sensitivity",
     "plot_soles",
     "plot_stance",
-    "plot_sway_cop",
-    "plot_sway_hip_roll",
-    "plot_sway_limits",
-    "plot_sway_load",
     "plot_torques",
     "plot_travel",
-    "plot_unit_of_length",
     "render_figure",
     "save_figure",
 ]

@@ -1,18 +1,18 @@
 """Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
 
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
-from copsense.simulation.engine import MujocoSimulator
+from copsense.simulation.events import Event, Thresholds
+from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.odometry import FootOdometry
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.rollout import rollout
 from copsense.simulation.scenario import Scenario
-from copsense.simulation.settings import PhysicsSettings
 from copsense.simulation.simulator import (
     AlterableSimulator,
     Simulator,
     SimulatorStoppedError,
     Snapshot,
 )
-from copsense.simulation.watch import Event, Thresholds
 
 __all__ = [
     "AlterableSimulator",

@@ -92,8 +92,7 @@ class Motors:
         if isinstance(limit, str):
             if limit != "model":
                 raise UnknownNameError("torque limit", limit, ("model",), "Or give numbers.")
-            effort = np.asarray(robot.model.upperEffortLimit)[robot.base_nv :]
-            return np.where(effort > 0, effort, np.inf)
+            return robot.effort_limits
         if isinstance(limit, Mapping):
             for joint, value in limit.items():
                 if joint not in names:

@@ -19,8 +19,8 @@ from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.margins import MarginTable, margin_table
 from copsense.scan import PathScan, ScanPoint
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
-from copsense.simulation.settings import PhysicsSettings
 from copsense.stance import Stance
 
 # What keeps a contact in its place, but for friction, which is taken as a cone below.
@@ -170,7 +170,9 @@ def predict(
     scan = PathScan(path, criterion, limits, start=0.0)
     start = scan.begin
     gaps = _Gaps(start.stance, friction)
-    found = scan.first(lambda point: gaps.rates(point, _TOUCHING), side)
+    # Limits may hold a centre of pressure on the very edge, within rounding.
+    touching = 0.0 if limits is None else _TOUCHING
+    found = scan.first(lambda point: gaps.rates(point, touching), side)
     left, rates = gaps.rates(start)
     closing = -side * rates
     first = np.where(closing > _CLOSING * gaps.weight, left, np.inf)

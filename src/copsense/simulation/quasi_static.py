@@ -43,9 +43,7 @@ class QuasiStatic:
         return self.share <= STATIC_SHARE
 
 
-def quasi_static(
-    stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Signal
-) -> QuasiStatic:
+def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Signal) -> QuasiStatic:
     """How far a signal along a path is from being followed at rest.
 
     Args:

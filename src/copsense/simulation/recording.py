@@ -12,8 +12,8 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES, half_planes
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
+from copsense.simulation.events import Event
 from copsense.simulation.simulator import Snapshot
-from copsense.simulation.watch import Event
 from copsense.stance import Stance
 
 _LOADED = 1e-3  # share of the weight under which a contact has no centre of pressure

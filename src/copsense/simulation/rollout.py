@@ -17,6 +17,7 @@ from copsense.controllers.controller import Controller, Observation, ask, contro
 from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.simulation.actuation import Actuation
+from copsense.simulation.events import Event, EventDetector, Thresholds
 from copsense.simulation.odometry import FootOdometry
 from copsense.simulation.recording import Recorder
 from copsense.simulation.scenario import Scenario
@@ -26,7 +27,6 @@ from copsense.simulation.simulator import (
     SimulatorStoppedError,
     Snapshot,
 )
-from copsense.simulation.watch import Event, Thresholds, Watch
 from copsense.stance import Stance
 
 _PLACE = 1e-5  # m, rad: contacts nearer than this are at one place
@@ -118,7 +118,7 @@ def _run(
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
     sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance, dt)
-    watch, recorder = Watch(stance, thresholds), Recorder(stance)
+    watch, recorder = EventDetector(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
     if count < 1:

@@ -17,7 +17,7 @@ import pinocchio as pin
 import xarray as xr
 
 from copsense.errors import InvalidInputError, MissingExtraError, OutputError
-from copsense.simulation.engine import load_mujoco
+from copsense.simulation.mujoco_simulator import load_mujoco
 from copsense.stance import Stance
 from copsense.storage import check_output, write_beside
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Float
 
+from copsense import rigid_body
 from copsense.arrays import finite_array
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
@@ -64,15 +64,9 @@ class StaticEquilibrium:
 
     def residual(self) -> float:
         """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
-        robot = self.stance.robot
-        zero = np.zeros(robot.model.nv)
-        needed = pin.rnea(
-            robot.model,
-            robot.model.createData(),
-            self.stance.q,
-            zero,
-            zero,
-            self.stance.joint_wrenches(self.forces),
+        stance, robot = self.stance, self.stance.robot
+        needed = np.array(
+            rigid_body.torques_at_rest(robot, stance.q, stance.joint_wrenches(self.forces))
         )
         needed[robot.base_nv :] -= self.torques
         return float(np.abs(needed).max())

@@ -1,0 +1,45 @@
+"""What starting costs: CPU time of an import, of the help and of one analysis, beside its parts.
+
+Run: .venv/bin/python benchmarks/startup.py
+"""
+
+from __future__ import annotations
+
+import os
+import statistics
+import subprocess
+import sys
+
+REPEATS = 7
+ENTRY = "from copsense.cli import main; main()"
+# what it is -> (arguments of the interpreter, the most it may take [s]; None for the yardstick)
+STARTS = {
+    "import numpy, pinocchio": (["-c", "import numpy, pinocchio"], None),
+    "import copsense": (["-c", "import copsense"], 0.5),
+    "copsense --help": (["-c", ENTRY, "--help"], 0.4),
+    "copsense analyse icub": (["-c", ENTRY, "analyse", "icub"], 1.5),
+}
+
+
+def cpu_time(arguments: list[str]) -> float:
+    """User and system time of one process [s]."""
+    before = os.times()
+    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    after = os.times()
+    return (after.children_user - before.children_user) + (
+        after.children_system - before.children_system
+    )
+
+
+def measure(name: str) -> float:
+    """Median CPU time of one of `STARTS` [s]; the first run, which may compile, is not counted."""
+    arguments, _ = STARTS[name]
+    cpu_time(arguments)
+    return statistics.median(cpu_time(arguments) for _ in range(REPEATS))
+
+
+if __name__ == "__main__":
+    print(f"{'CPU time, median of ' + str(REPEATS):26}  seconds")
+    for name, (_, most) in STARTS.items():
+        allowed = "" if most is None else f"  (at most {most})"
+        print(f"{name:26}  {measure(name):7.2f}{allowed}")

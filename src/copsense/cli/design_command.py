@@ -1,0 +1,169 @@
+"""``copsense design``: the criterion that lets the CoM travel farthest."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.quantities import read_range
+from copsense.cli.stance_options import read_stance, stance_options
+from copsense.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.design import Design, Score
+
+_SAME = 1e-6  # relative: less is no gain
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  copsense design icub --family length --com-y -0.08:0.08:17\n"
+    "  copsense design icub --family joints --limits friction=0.33,torque=model --plot design.png"
+)
+@stance_options
+@click.option(
+    "--family",
+    default="joints",
+    show_default=True,
+    metavar="NAME",
+    help="What may be chosen: length (of minimum-wrench), joints (torque weights of hips, knees "
+    "and ankles) or mix (of minimum-torque with minimum-wrench).",
+)
+@click.option(
+    "--objective",
+    default="travel",
+    show_default=True,
+    metavar="NAME",
+    help="travel: the farthest CoM travel to the first limit; gain: the least |dCoP/dCoM|.",
+)
+@click.option(
+    "--com-y",
+    default="-0.09:0.09:37",
+    show_default=True,
+    metavar="START:STOP:COUNT",
+    help="The path: world y of the CoM [m], its middle being where the travel begins.",
+)
+@click.option(
+    "--grid", type=click.IntRange(min=2), default=7, show_default=True, help="Values a parameter."
+)
+@click.option(
+    "--plot",
+    "picture",
+    type=click.Path(),
+    help="Draw the gain and the travel of every candidate against its torques: .png, .svg or .pdf.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the picture.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, with the Pareto set.")
+def design(
+    robot: str,
+    limits: str | None,
+    family: str,
+    objective: Any,
+    com_y: str,
+    grid: int,
+    picture: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Design the weights of a criterion for ROBOT, and say what they gain over the paper's two.
+
+    The CoM is swept sideways from the posture; each candidate is judged by how far it goes before
+    its own wrenches, unclipped, meet a limit.
+    """
+    from copsense.design import design_criterion, families
+    from copsense.limits import Limits
+    from copsense.path import lateral_sweep
+    from copsense.storage import check_output
+
+    if picture is not None:
+        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    within = read_limits(limits) or Limits()
+    start, stop, count = read_range(com_y, "m")
+    stance = read_stance(robot, **options)
+    known = families(stance)
+    if family not in known:
+        raise UnknownNameError("family", family, known)
+    with progress_bar(count, "postures") as update:
+        path = lateral_sweep(stance, start, stop, count, progress=update)
+    with progress_bar(grid ** len(known[family].parameters), "candidates") as update:
+        found = design_criterion(
+            path, within, known[family], objective=objective, grid=grid, progress=update
+        )
+    if picture is not None:
+        from copsense.plots import plot_design, save_figure
+
+        save_figure(plot_design(found), picture, overwrite=force)
+    if as_json:
+        echo_json(
+            {
+                "robot": stance.robot.name,
+                "family": family,
+                "objective": objective,
+                "best": asdict(found.score),
+                "baselines": [asdict(s) for s in found.baselines],
+                "pareto": [asdict(s) for s in found.pareto],
+            }
+        )
+    else:
+        _print(stance.robot.name, found)
+        if picture is not None:
+            click.echo()
+            echo_written(picture)
+
+
+def _print(robot: str, found: Design) -> None:
+    from copsense.design import NO_LIMIT
+
+    click.echo(f"{robot}: family {found.family}, objective {found.objective}")
+    click.echo("criterion         travel [mm]  worst gain  torque norm [N m]  first limit")
+    for row in (*found.baselines, found.score):
+        click.echo(_line(row))
+    chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
+    click.echo(f"\nbest: {chosen}; {_gained(found)}")
+    reach = found.score.range * 1e3
+    click.echo(
+        "worst gain: the largest |dCoP/dCoM| of any contact; it and the torque norm (rms) are over "
+        f"the postures within {reach:.1f} mm of the middle"
+    )
+    if NO_LIMIT in (found.score.first_limit, *(s.first_limit for s in found.baselines)):
+        click.echo(
+            "note: the path ends before a limit is met, so that travels of its length are not told "
+            "apart. Sweep farther: --com-y START:STOP:COUNT.",
+            err=True,
+        )
+    click.echo("\nPareto set (no other is better in both):")
+    for row in found.pareto:
+        chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
+        click.echo(_line(row) + f"  {chosen}")
+
+
+def _gained(found: Design) -> str:
+    """What the designed criterion is worth beside the better of the paper's two."""
+    if found.objective == "gain":
+        best = min(found.baselines, key=lambda s: s.worst_gain)
+        change = found.score.worst_gain / best.worst_gain - 1 if best.worst_gain > 0 else 0.0
+        better, what = change < -_SAME, "worst gain"
+    else:
+        best = max(found.baselines, key=lambda s: s.travel)
+        if best.travel == 0:
+            own = found.score.travel * 1e3
+            return f"{own:.1f} mm, where the paper's two are beyond a limit in the middle already"
+        change = found.score.travel / best.travel - 1 if best.travel > 0 else 0.0
+        better, what = change > _SAME, "travel"
+    if not better:
+        return (
+            f"no better than {best.criterion} ({what} {change * 100:+.1f} %): keep {best.criterion}"
+        )
+    return f"{what} {change * 100:+.0f} % over the better of the paper's two"
+
+
+def _line(row: Score) -> str:
+    return (
+        f"{row.criterion:16}  {row.travel * 1e3:11.1f}  {row.worst_gain:10.3f}"
+        f"  {row.torque_norm:17.2f}  {row.first_limit}"
+    )

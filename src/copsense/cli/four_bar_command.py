@@ -1,0 +1,110 @@
+"""``copsense four-bar``: the paper's linkage in closed form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import click
+
+from copsense.cli.printing import echo_json
+from copsense.errors import InvalidInputError, UnknownNameError
+
+
+@click.command(
+    "four-bar",
+    epilog="Example: copsense four-bar --leg-length 0.5 --rod-length 0.14 --leg-mass 8.25 "
+    "--body-mass 16.5 --xi 1.5 --criterion minimum-torque --json",
+)
+@click.option("--leg-length", type=float, default=0.5, show_default=True, help="l [m].")
+@click.option("--rod-length", type=float, default=0.14, show_default=True, help="d [m].")
+@click.option("--leg-mass", type=float, default=8.25, show_default=True, help="m_l [kg].")
+@click.option("--body-mass", type=float, default=16.5, show_default=True, help="m_b [kg].")
+@click.option(
+    "--xi",
+    type=float,
+    default=math.pi / 2,
+    show_default="pi/2",
+    help="Angle between rod and leg [rad]; pi/2 stands upright.",
+)
+@click.option(
+    "--criterion",
+    default="minimum-torque",
+    show_default=True,
+    metavar="NAME",
+    help="minimum-wrench, minimum-torque, weighted-torque or minimum-tangential.",
+)
+@click.option(
+    "--characteristic-length",
+    type=float,
+    default=1.0,
+    show_default=True,
+    metavar="M",
+    help="L [m] of minimum-wrench and minimum-tangential.",
+)
+@click.option(
+    "--hip-weight", type=float, default=1.0, show_default=True, help="Of weighted-torque."
+)
+@click.option("--ankle-weight", type=float, default=1.0, show_default=True, help="Likewise.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def four_bar(
+    leg_length: float,
+    rod_length: float,
+    leg_mass: float,
+    body_mass: float,
+    xi: float,
+    criterion: str,
+    as_json: bool,
+    **parameters: float,
+) -> None:
+    """The planar four-bar linkage of [Romano2016] in closed form.
+
+    Axes as in the paper: x right, y up, left foot at -x, moments counter-clockwise. Wrenches are
+    [fx, fy, mz], ground on foot [N, N, N m].
+    """
+    from copsense.paper import FOUR_BAR_CRITERIA, FourBar, solve_four_bar
+
+    if criterion not in FOUR_BAR_CRITERIA:
+        raise UnknownNameError("criterion of the four-bar", criterion, FOUR_BAR_CRITERIA)
+    if not math.isfinite(xi):
+        raise InvalidInputError(f"xi must be a finite angle [rad], got {xi}.")
+    own = {k: v for k, v in parameters.items() if k in FOUR_BAR_CRITERIA[criterion].defaults}
+    linkage = FourBar(leg_length, rod_length, leg_mass, body_mass)
+    solution = solve_four_bar(linkage, xi, criterion, **own)
+    sides = ("left", "right")
+    answer: dict[str, Any] = {
+        "wrenches": dict(zip(sides, solution.wrenches, strict=True)),
+        "torques": dict(
+            zip(("hipL", "ankleL", "hipR", "ankleR"), solution.torques.tolist(), strict=True)
+        ),
+        "cop": dict(zip(sides, solution.cop.tolist(), strict=True)),
+        "sensitivity": dict(zip(sides, solution.sensitivity.tolist(), strict=True)),
+        "cop_per_com": dict(zip(sides, solution.cop_per_com.tolist(), strict=True)),
+        "com": solution.com,
+        "load_transfer_share": solution.share,
+        "criterion": criterion,
+        "parameters": {
+            "leg_length": leg_length,
+            "rod_length": rod_length,
+            "leg_mass": leg_mass,
+            "body_mass": body_mass,
+            "xi": xi,
+            **own,
+        },
+    }
+    if as_json:
+        echo_json(answer)
+        return
+    click.echo(
+        f"{criterion} at xi = {xi:.6g} rad, CoM at ({solution.com[0]:.4f}, {solution.com[1]:.4f}) m"
+    )
+    click.echo("from the left foot (x right, y up)\n")
+    click.echo("foot    fx [N]      fy [N]      mz [N m]    CoP [mm]   dCoP/dxi [m/rad]  dCoP/dCoM")
+    for k, side in enumerate(sides):
+        fx, fy, mz = solution.wrenches[k]
+        click.echo(
+            f"{side:6}{fx:10.3f}  {fy:10.3f}  {mz:10.4f}  {solution.cop[k] * 1e3:10.3f}"
+            f"  {solution.sensitivity[k]:15.6f}  {solution.cop_per_com[k]:9.4f}"
+        )
+    torques = ", ".join(f"{name} {value:.4f}" for name, value in answer["torques"].items())
+    click.echo(f"\ntorques [N m]: {torques}")

@@ -1,0 +1,68 @@
+"""``--limits``: what the wrenches must respect."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.limits import Limits
+
+limits_option = click.option(
+    "--limits",
+    metavar="NAME=VALUE,...",
+    help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+    "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+    "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+    "friction); off switches one off. Example: friction=0.33,torque=model.",
+)
+
+
+def read_limits(text: str | None) -> Limits | None:
+    """The limits that ``--limits`` describes, or None."""
+    from copsense.limits import Limits
+
+    if text is None:
+        return None
+    names = {
+        "normal-force": "normal_force",
+        "friction": "friction",
+        "sides": "friction_sides",
+        "cop-margin": "cop_margin",
+        "torsion": "torsion",
+        "torque": "torque",
+    }
+    values: dict[str, Any] = {}
+    for part in filter(None, text.split(",")):
+        name, _, value = part.partition("=")
+        if name in ("off", "none"):
+            raise InvalidInputError(
+                f"--limits {name} is no limit. Leave --limits out for none at all, or switch one "
+                "off by name, such as friction=off."
+            )
+        if name not in names:
+            raise UnknownNameError("limit", name, names)
+        if names[name] in values:
+            raise InvalidInputError(f"the limit {name} is given twice. Give it once.")
+        values[names[name]] = _limit_value(name, value)
+    return Limits(**values)
+
+
+def _limit_value(name: str, value: str) -> float | int | str | None:
+    if value == "off" and name != "sides":
+        return None
+    if value in {
+        "friction": ("contact",),
+        "torsion": ("contact", "cone"),
+        "torque": ("model",),
+    }.get(name, ()):
+        return value
+    try:
+        return int(value) if name == "sides" else float(value)
+    except ValueError:
+        raise InvalidInputError(
+            f"the limit {name}={value!r} is no number. Write, say, {name}=8 or {name}=off."
+        ) from None

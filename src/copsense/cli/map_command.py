@@ -1,0 +1,309 @@
+"""``copsense map``: a whole space of postures into a Zarr store, here or on a cluster."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, progress_bar
+from copsense.cli.stance_options import read_stance, stance_options
+from copsense.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.maps import Axis, MapSummary
+    from copsense.stance import Stance
+
+
+@click.command(
+    "map",
+    epilog="Example: copsense map icub --over com_y=-0.05:0.05:101 --over com_z=0.47:0.5:61 "
+    "--output icub.zarr --plot icub.png. The same command goes on with a map that was stopped.",
+)
+@stance_options
+@criterion_options
+@click.option(
+    "--over",
+    multiple=True,
+    required=True,
+    metavar="NAME=START:STOP[:COUNT]",
+    help="A coordinate and its range, absolute, world axes: com_x, com_y, com_z, base_x, base_y, "
+    "base_z [m]; roll, pitch, yaw or a joint [deg; m if prismatic]; CONTACT:x, CONTACT:y [m], "
+    "CONTACT:yaw [deg]. With COUNT a grid. Repeatable.",
+)
+@click.option("--samples", type=int, metavar="N", help="A quasi-random sample instead of a grid.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample.")
+@click.option(
+    "--sequence",
+    type=click.Choice(["sobol", "halton"]),
+    default="sobol",
+    show_default=True,
+    help="Low-discrepancy sequence of the sample.",
+)
+@click.option(
+    "--output", required=True, type=click.Path(), metavar="FILE.zarr", help="The store to write."
+)
+@click.option(
+    "--configurations", is_flag=True, help="Store the configurations too (float64, nq a posture)."
+)
+@click.option(
+    "--chunk",
+    type=int,
+    default=4096,
+    show_default=True,
+    metavar="N",
+    help="Postures that are evaluated, written and resumed as one.",
+)
+@click.option("--threads", type=int, default=1, show_default=True, help="Chunks at a time.")
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Evaluate on the workers of this Dask scheduler; they must see the output.",
+)
+@click.option("--local", type=int, metavar="N", help="Evaluate on N Dask workers started here.")
+@click.option("--plot", type=click.Path(), metavar="FILE", help="Draw it: .png, .svg or .pdf.")
+@click.option("--plot-over", metavar="NAME,NAME", help="Coordinates to draw over; default first 2.")
+@click.option(
+    "--marginal",
+    type=click.Choice(["worst", "median"]),
+    default="worst",
+    show_default=True,
+    help="What the picture shows of the coordinates not drawn over.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the picture; a store is never overwritten.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def map_command(
+    robot: str,
+    criteria: tuple[str, ...],
+    characteristic_length: float,
+    limits: str | None,
+    over: tuple[str, ...],
+    samples: int | None,
+    seed: int,
+    sequence: str,
+    output: str,
+    configurations: bool,
+    chunk: int,
+    threads: int,
+    scheduler: str | None,
+    local: int | None,
+    plot: str | None,
+    plot_over: str | None,
+    marginal: Any,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Map the sensitivity of ROBOT over a space of postures, contacts in place.
+
+    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. Evaluates a grid or a
+    sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
+    reached or evaluated is a row with its reason, and makes the exit code 1.
+    """
+    from copsense.batch import BatchKernel
+    from copsense.maps import MapPlan
+    from copsense.maps.mapping import fill_map
+    from copsense.maps.reach import height_advice
+    from copsense.maps.sampling import sampling_of
+    from copsense.maps.store import check_store
+    from copsense.maps.summary import summarise
+    from copsense.storage import check_output
+
+    check_store(output)
+    if plot is not None:
+        check_output(plot, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+        if len(over) < 2:
+            raise InvalidInputError("--plot draws over two coordinates. Give --over twice.")
+    elif plot_over is not None:
+        raise InvalidInputError("--plot-over is for a picture. Give --plot FILE too.")
+    chosen = read_criteria(criteria, characteristic_length)
+    within = read_limits(limits)
+    stance = read_stance(robot, **options)
+    sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
+    pair = _pair(plot_over, sampling.names)
+    if not Path(output).exists():
+        why = BatchKernel(stance, chosen).fallback_reason
+        slow = f"postures are evaluated one at a time, milliseconds each: {why}" if why else ""
+        for note in filter(None, (slow, height_advice(stance, sampling))):
+            click.echo(f"note: {note}", err=True)
+    done = 0
+    with progress_bar(len(sampling), "map") as update:
+
+        def progress(count: int) -> None:
+            nonlocal done
+            done += count
+            update(count)
+
+        try:
+            store = fill_map(
+                MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations),
+                output,
+                threads=threads,
+                scheduler=scheduler,
+                workers=local,
+                progress=progress,
+            )
+        except KeyboardInterrupt:
+            click.echo(
+                f"\nstopped: {done} of {len(sampling)} postures are in {output}. Run the same "
+                "command again to go on.",
+                err=True,
+            )
+            click.get_current_context().exit(130)
+    with progress_bar(2 * len(sampling), "summary") as update:
+        summary = summarise(store, update)
+    if plot is not None:
+        _draw(stance, summary, plot, pair, marginal, force)
+    if as_json:
+        echo_json(_as_json(summary, plot))
+    else:
+        _print(summary, plot)
+    click.get_current_context().exit(1 if _failures(summary) else 0)
+
+
+def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:
+    """``NAME=START:STOP[:COUNT]`` options; degrees become radians."""
+    from copsense.batch import PostureChart
+    from copsense.maps import Axis
+
+    ranges = {}
+    for text in texts:
+        name, _, numbers = text.partition("=")
+        try:
+            start, stop, *count = numbers.split(":")
+            low, high = float(start), float(stop)
+            if len(count) > 1:
+                raise ValueError
+            points = int(count[0]) if count else None
+        except ValueError:
+            raise InvalidInputError(
+                f"{text!r} is not understood. Give NAME=START:STOP:COUNT, such as "
+                "com_y=-0.03:0.03:41, or NAME=START:STOP with --samples."
+            ) from None
+        if name in ranges:
+            raise InvalidInputError(f"--over names {name} twice. Give each coordinate once.")
+        ranges[name] = low, high, points
+    chart = PostureChart(stance, tuple(ranges))
+    found = []
+    for (name, (low, high, points)), unit in zip(ranges.items(), chart.units, strict=True):
+        factor = math.pi / 180 if unit == "rad" else 1.0
+        found.append(Axis(name, low * factor, high * factor, points))
+    return found
+
+
+def _pair(text: str | None, known: tuple[str, ...]) -> tuple[str, str] | None:
+    """The two coordinates of ``NAME,NAME``, asked for before the work starts."""
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(","))
+    for name in names:
+        if name not in known:
+            raise UnknownNameError("coordinate of the map", name, known)
+    if len(set(names)) != 2 or len(names) != 2:
+        raise InvalidInputError(
+            f"--plot-over is {text!r}. Give two coordinates of the map, such as "
+            f"--plot-over {known[0]},{known[-1]}."
+        )
+    return names[0], names[1]
+
+
+def _draw(
+    stance: Stance,
+    summary: MapSummary,
+    plot: str,
+    names: tuple[str, str] | None,
+    how: Any,
+    force: bool,
+) -> None:
+    from copsense.maps import load_map, marginal, skeleton, worst_stances
+    from copsense.plots import plot_map, save_figure
+
+    dataset = load_map(summary.path)
+    marginals = [
+        marginal(dataset, names, quantity, how)
+        for quantity in ("least_com_travel", "largest_com_gain")
+    ]
+    worst = {
+        name: [
+            skeleton(here)
+            for here in worst_stances(
+                stance, [w for w in row.worst_travel[:3] if math.isfinite(w.value)]
+            )
+        ]
+        for name, row in summary.criteria.items()
+    }
+    save_figure(plot_map(marginals, worst), plot, overwrite=force)
+
+
+def _failures(summary: MapSummary) -> int:
+    kinds = ("unreachable", "refused", "unsolved")
+    return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
+
+
+def _as_json(summary: MapSummary, plot: str | None) -> dict[str, Any]:
+    return {
+        "robot": summary.robot,
+        "output": summary.path,
+        "plot": plot,
+        "coordinates": dict(zip(summary.coordinates, summary.units, strict=True)),
+        "postures": summary.postures,
+        "complete": summary.complete,
+        "criteria": {
+            name: {
+                "counts": row.counts,
+                "share": {k: n / summary.postures for k, n in row.counts.items()},
+                "worst_travel": [vars(w) for w in row.worst_travel],
+                "worst_gain": [vars(w) for w in row.worst_gain],
+                "travel_percentiles": row.travel_percentiles,
+                "gain_percentiles": row.gain_percentiles,
+                "failed": {status: vars(first) for status, first in row.failed.items()},
+            }
+            for name, row in summary.criteria.items()
+        },
+    }
+
+
+def _print(summary: MapSummary, plot: str | None) -> None:
+    over = ", ".join(summary.coordinates)
+    click.echo(f"{summary.robot}: {summary.postures} postures over {over}")
+    units = dict(zip(summary.coordinates, summary.units, strict=True))
+    told: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
+    for name, row in summary.criteria.items():
+        shares = ", ".join(
+            f"{count / summary.postures:.1%} {kind}" for kind, count in row.counts.items() if count
+        )
+        click.echo(f"  {name}: {shares}")
+        for status, first in row.failed.items():
+            if (status, first.posture) not in told:
+                reason = first.reason.removeprefix(f"{status}: ")
+                click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
+            told.add((status, first.posture))
+        if row.worst_travel and math.isinf(row.worst_travel[0].value):
+            click.echo("    CoM travel: without end, no contact can tip")
+        elif row.worst_travel:
+            worst = row.worst_travel[0]
+            middle = row.travel_percentiles[50.0]
+            click.echo(
+                f"    CoM travel: worst {worst.value * 1e3:+.1f} mm at "
+                f"{_place(worst.coordinates, units)}"
+                + (f" (edge {worst.tipping_edge} of {worst.contact})" if worst.contact else "")
+                + f"; median {middle * 1e3:+.1f} mm"
+            )
+        if row.worst_gain:
+            gain = row.worst_gain[0]
+            click.echo(
+                f"    CoM gain: worst {gain.value:.2f} at {_place(gain.coordinates, units)}; "
+                f"median {row.gain_percentiles[50.0]:.2f}"
+            )
+    click.echo(f"written: {summary.path}" + (f", {plot}" if plot else ""))
+
+
+def _place(coordinates: Any, units: dict[str, str]) -> str:
+    return ", ".join(
+        f"{name} {math.degrees(v):+.2f} deg" if units[name] == "rad" else f"{name} {v:+.4f} m"
+        for name, v in coordinates.items()
+    )

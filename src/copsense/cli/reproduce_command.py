@@ -1,0 +1,77 @@
+"""``copsense reproduce``: the paper reproduced, as a report."""
+
+from __future__ import annotations
+
+import importlib.util
+import shlex
+import sys
+
+import click
+
+from copsense.cli.limit_options import limits_option, read_limits
+
+
+@click.command(epilog="Example: copsense reproduce --output reproduction")
+@click.option(
+    "--output",
+    type=click.Path(),
+    default="reproduction",
+    show_default=True,
+    help="Folder for the report, its figures and data.",
+)
+@click.option(
+    "--postures",
+    type=click.IntRange(min=21),
+    default=141,
+    show_default=True,
+    help="Postures of the iCub's lateral sweep.",
+)
+@click.option("--static", is_flag=True, help="Leave the closed loop in MuJoCo out.")
+@limits_option
+@click.option("--force", is_flag=True, help="Overwrite an earlier reproduction.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+def reproduce(
+    output: str, postures: int, static: bool, limits: str | None, force: bool, quiet: bool
+) -> None:
+    """Reproduce [Romano2016] on the four-bar and on the iCub, statically and in closed loop.
+
+    Every claim of the paper is tested (holds, holds if, does not hold), every figure drawn, and one
+    self-contained HTML report written. The last line printed is its path. Limits are those of the
+    report's section on them; by default, what public configurations for this robot use.
+    """
+    from copsense.paper.report import check_report_folder, write_report
+    from copsense.paper.reproduce import LIMITS, SWAY_FREQUENCY, reproduce_paper
+
+    check_report_folder(output, overwrite=force)
+    within = read_limits(limits) or LIMITS
+    if not static and importlib.util.find_spec("mujoco") is None:
+        click.echo(
+            'note: without MuJoCo the closed loop is left out (pip install "copsense[sim]").',
+            err=True,
+        )
+        static = True
+    command = f"copsense {shlex.join(sys.argv[1:])}"
+    from tqdm import tqdm
+
+    form = "{desc} {n}/{total} [{elapsed}]"
+    # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
+    with tqdm(total=0, disable=quiet or None, leave=False, bar_format=form) as bar:
+        stages: list[str] = []
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in stages:
+                stages.append(stage)
+                if bar.disable and not quiet:
+                    click.echo(f"{stage} ...", err=True)
+                bar.reset(total)
+                bar.set_description_str(stage, refresh=False)
+            bar.update(done - bar.n)
+
+        result = reproduce_paper(
+            postures=postures,
+            limits=within,
+            sway_frequency=None if static else SWAY_FREQUENCY,
+            progress=show,
+        )
+        path = write_report(result, output, overwrite=force, command=command)
+    click.echo(str(path))

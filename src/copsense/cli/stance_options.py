@@ -1,0 +1,169 @@
+"""The options that say which robot stands where, and the stance they describe."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.limit_options import limits_option
+from copsense.cli.option_lists import F, with_options
+from copsense.cli.quantities import ANGLE, LENGTH, read_positions, read_quantity
+from copsense.errors import InvalidInputError, UnknownNameError
+
+if TYPE_CHECKING:
+    from copsense.contact import Contact
+    from copsense.stance import Stance
+
+
+def stance_options(command: F) -> F:
+    """The robot, how it stands, and what it must respect."""
+    options = [
+        click.argument("robot"),
+        click.option(
+            "--contact",
+            "contacts",
+            multiple=True,
+            metavar="FRAME[:KIND]",
+            help="Contact frame; KIND is surface (default) or point. Repeatable; a preset "
+            "has its own.",
+        ),
+        click.option(
+            "--contact-at",
+            type=click.Choice(["frame", "sole"]),
+            help="Put surface contacts at the model's frame, or at the sole's bottom as the "
+            "collision geometry shows it.",
+        ),
+        click.option(
+            "--sole",
+            metavar="X0:X1:Y0:Y1",
+            help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
+            "the collision geometry's.",
+        ),
+        click.option(
+            "--sole-height",
+            type=LENGTH,
+            metavar="LENGTH",
+            help="Height of the contact plane over the model's frames, along its normal [m].",
+        ),
+        click.option(
+            "--package-dir",
+            "package_dirs",
+            multiple=True,
+            type=click.Path(file_okay=False),
+            help="Folder in which package:// meshes are looked up. Repeatable.",
+        ),
+        click.option(
+            "--posture",
+            multiple=True,
+            metavar="JOINT=POSITION",
+            help="Joint position that the posture stays nearest to: degrees, or metres for a "
+            "prismatic joint, or with its unit (20deg, 0.35rad, 25mm). Repeatable.",
+        ),
+        click.option(
+            "--base-yaw",
+            type=ANGLE,
+            metavar="ANGLE",
+            help="Heading of the base (degrees, or 3.14rad), so that the robot faces +x; a "
+            "preset has its own.",
+        ),
+        click.option(
+            "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
+        ),
+        limits_option,
+    ]
+    return with_options(options, command)
+
+
+def read_stance(
+    robot: str,
+    contacts: tuple[str, ...],
+    contact_at: Any,
+    sole: str | None,
+    sole_height: float | None,
+    package_dirs: tuple[str, ...],
+    posture: tuple[str, ...],
+    base_yaw: float | None,
+    width: float | None,
+) -> Stance:
+    """The stance that the options of `stance_options` describe; lengths [m], angles [rad]."""
+    from copsense.robots import PRESETS, load_robot, load_stance
+
+    if sole_height is not None:
+        if contact_at == "sole":
+            raise InvalidInputError(
+                "--sole-height and --contact-at sole both say where the contacts are. Give one."
+            )
+        contact_at = "frame"  # moved by the height, and no farther
+    # A preset is passed by name, so that its feet and posture come along.
+    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    # Which unit a bare number has depends on the joint.
+    positions = (
+        read_positions(posture, load_robot(robot, package_dirs=package_dirs)) if posture else {}
+    )
+    return load_stance(
+        source,
+        contacts=_read_contacts(robot, contacts, sole, sole_height),
+        contact_at=contact_at,
+        package_dirs=package_dirs,
+        posture=positions,
+        base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
+        width=width,
+    )
+
+
+def _read_contacts(
+    robot: str, texts: tuple[str, ...], sole: str | None, sole_height: float | None
+) -> list[str | Contact] | None:
+    """``FRAME[:KIND]`` options as contacts; a frame alone takes what its preset knows of it."""
+    from dataclasses import replace
+
+    from copsense.contact import COMPONENTS, Contact, rectangle
+    from copsense.robots import PRESETS
+
+    known = PRESETS[robot].contacts if robot in PRESETS else ()
+    contacts: list[Contact] = [] if texts else list(known)
+    for text in texts:
+        frame, colon, kind = text.partition(":")
+        if colon and kind not in COMPONENTS:
+            raise UnknownNameError("kind of contact", kind, COMPONENTS)
+        own = next((c for c in known if c.frame == frame), Contact(frame))
+        contacts.append(replace(own, kind=kind) if colon else own)  # type: ignore[arg-type]
+    described = sole is not None or sole_height is not None
+    if described and contacts and all(c.kind == "point" for c in contacts):
+        raise InvalidInputError(
+            "--sole and --sole-height describe a sole, and every contact is a point. Leave them "
+            "out, or give a surface contact: --contact FRAME:surface."
+        )
+    if sole is not None:
+        polygon = rectangle(*_read_rectangle(sole))
+        contacts = [replace(c, polygon=polygon) if c.kind != "point" else c for c in contacts]
+    if sole_height is not None:
+        if not math.isfinite(sole_height):
+            raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
+        contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
+    return list(contacts) or None
+
+
+def _raised(contact: Contact, height: float) -> Contact:
+    """The contact with its plane that high over the model's frame, along its own z."""
+    from dataclasses import replace
+
+    x, y, z = (float(c) * height for c in contact.rotation[:, 2])
+    return replace(contact, offset=(x, y, z))
+
+
+def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:
+    try:
+        x0, x1, y0, y1 = (read_quantity(number, "m") for number in text.split(":"))
+    except ValueError:
+        raise InvalidInputError(
+            f"the sole {text!r} is not understood. Give X0:X1:Y0:Y1 [m], such as "
+            "-0.07:0.12:-0.045:0.05."
+        ) from None
+    if not (-math.inf < x0 < x1 < math.inf and -math.inf < y0 < y1 < math.inf):
+        raise InvalidInputError(
+            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]."
+        )
+    return (x0, x1), (y0, y1)

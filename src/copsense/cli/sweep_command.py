@@ -1,0 +1,215 @@
+"""``copsense sweep`` and ``copsense plot``: many postures, and their picture."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.quantities import read_range
+from copsense.cli.stance_options import read_stance, stance_options
+from copsense.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from copsense.path import PosturePath
+    from copsense.stance import Stance
+
+_OVER_LIMIT = 1e-6  # rad: less is rounding
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  copsense sweep icub --com-y -0.07:0.07:201 --output icub.nc\n"
+    "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv"
+)
+@stance_options
+@criterion_options
+@click.option(
+    "--com-y",
+    metavar="START:STOP:COUNT",
+    help="Sweep the CoM sideways, world y [m]; CoM x held over the contacts' middle.",
+)
+@click.option(
+    "--joint",
+    metavar="NAME=START:STOP:COUNT",
+    help="Sweep a joint: degrees, or metres for a prismatic joint, or with units (0mm:200mm:3).",
+)
+@click.option(
+    "--configurations",
+    type=click.Path(),
+    metavar="FILE",
+    help="Evaluate these: a row (nq numbers) per posture, .csv or .npy; the first fixes the feet.",
+)
+@click.option(
+    "--output",
+    type=click.Path(),
+    help="Write netCDF (.nc, everything) or a table (.csv); print a summary alone if not given.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the output.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def sweep(
+    robot: str,
+    criteria: tuple[str, ...],
+    characteristic_length: float,
+    limits: str | None,
+    com_y: str | None,
+    joint: str | None,
+    configurations: str | None,
+    output: str | None,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Sweep the CoM or a joint of ROBOT, contacts in place, and evaluate every posture.
+
+    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. A posture that fails is
+    a row with its reason, and makes the exit code 1.
+    """
+    from copsense.storage import check_output, write_results
+    from copsense.sweep_margins import with_limit_margins
+    from copsense.sweeps import failed_rows
+    from copsense.sweeps import sweep as evaluate
+
+    if sum(what is not None for what in (com_y, joint, configurations)) != 1:
+        raise InvalidInputError(
+            "say what to sweep, one of: --com-y START:STOP:COUNT [m], "
+            "--joint NAME=START:STOP:COUNT, --configurations FILE."
+        )
+    if output is not None:
+        check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
+    chosen = read_criteria(criteria, characteristic_length)
+    within = read_limits(limits)
+    path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
+    with progress_bar(len(path), "criteria") as update:
+        dataset = evaluate(path, chosen, within, progress=update)
+    if within is not None and within.any:
+        dataset = with_limit_margins(dataset, within)
+    dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
+    failures = failed_rows(dataset)
+    if output is not None:
+        write_results(dataset, output, overwrite=force)
+    summary = _summary(dataset, output, failures)
+    if as_json:
+        echo_json(summary)
+    else:
+        _print(summary)
+    model = path.stances[0].robot
+    units = dict(zip(model.torque_names, model.torque_units, strict=True))
+    beyond = dataset["joint_limit_excess"].max("posture")
+    for name in beyond["joint"].values[beyond.values > _OVER_LIMIT]:
+        count = int((dataset["joint_limit_excess"].sel(joint=name) > _OVER_LIMIT).sum())
+        unit = units[str(name)]
+        excess = float(beyond.sel(joint=name)) * (math.degrees(1.0) if unit == "rad" else 1e3)
+        click.echo(
+            f"note: {name} is beyond its limit at {count} postures, by up to {excess:.1f} "
+            f"{'deg' if unit == 'rad' else 'mm'}",
+            err=True,
+        )
+    for posture, criterion, reason in failures[:5]:
+        click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
+    if len(failures) > 5:
+        click.echo(f"failed: {len(failures) - 5} more; see the variable 'reason'", err=True)
+    click.get_current_context().exit(1 if failures else 0)
+
+
+def _read_path(
+    stance: Stance, com_y: str | None, joint: str | None, configurations: str | None
+) -> PosturePath:
+    """The path that the options ask for."""
+    from copsense.path import joint_sweep, lateral_sweep, path_through
+    from copsense.storage import load_configurations
+
+    if configurations is not None:
+        rows = load_configurations(configurations)
+        return path_through(stance.at(rows[0]), rows, strict=False)
+    if com_y is not None:
+        start, stop, count = read_range(com_y, "m")
+        with progress_bar(max(count, 0), "postures") as update:
+            return lateral_sweep(stance, start, stop, count, progress=update)
+    name, _, text = str(joint).partition("=")
+    start, stop, count = read_range(text, stance.robot.joint_unit(name))
+    with progress_bar(max(count, 0), "postures") as update:
+        return joint_sweep(stance, name, start, stop, count, progress=update)
+
+
+def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str, Any]:
+    """What a person wants to know first: over which range every foot stays planted."""
+    coordinate = dataset.attrs["coordinate"]
+    values = dataset[coordinate].values
+    degrees = dataset[coordinate].attrs["units"] == "rad"
+    criteria = {}
+    for name in dataset["criterion"].values:
+        here = dataset.sel(criterion=name)
+        if "active_limits" in dataset:
+            planted = (here["active_limits"] == "").values & (here["reason"] == "").values
+        else:
+            planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
+        run = _longest_run(planted)
+        criteria[str(name)] = {
+            "planted": sorted(float(values[i]) for i in run) if run else None,
+            "smallest_margin": float(here["margin"].min()),
+            "largest_residual": float(here["residual"].max()),
+        }
+    return {
+        "robot": dataset.attrs["robot"],
+        "coordinate": coordinate,
+        "unit": "rad" if degrees else dataset[coordinate].attrs["units"],
+        "postures": len(values),
+        "failed_rows": len(failures),
+        "output": output,
+        "criteria": criteria,
+        "limits": dataset.attrs.get("limits"),
+        "without_sole": dataset.attrs["without_sole"],
+    }
+
+
+def _longest_run(flags: Any) -> tuple[int, int] | None:
+    """First and last index of the longest run of true values."""
+    best, start = None, None
+    for i, flag in enumerate([*flags, False]):
+        if flag and start is None:
+            start = i
+        elif not flag and start is not None:
+            if best is None or i - 1 - start > best[1] - best[0]:
+                best = (start, i - 1)
+            start = None
+    return best
+
+
+def _rounded(value: float) -> float:
+    return round(value, 1) + 0.0  # no minus before a zero
+
+
+def _print(summary: dict[str, Any]) -> None:
+    unit, factor = summary["unit"], 1.0
+    if unit == "rad":
+        unit, factor = "deg", 180.0 / math.pi
+    click.echo(f"{summary['robot']}: {summary['postures']} postures along {summary['coordinate']}")
+    for name, row in summary["criteria"].items():
+        word = "no limit active" if summary["limits"] else "every contact planted"
+        if summary["without_sole"] and not summary["limits"]:
+            word = "every contact pushes"
+        if row["planted"] is None:
+            planted = f"{word} at no posture"
+        else:
+            low, high = (value * factor for value in row["planted"])
+            planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
+        if math.isfinite(row["smallest_margin"]):
+            planted += (
+                f"; smallest margin on the way {_rounded(row['smallest_margin'] * 1e3):+.1f} mm"
+            )
+        click.echo(f"  {name}: {planted}")
+    if summary["without_sole"]:
+        click.echo(
+            f"note: no sole is known under {summary['without_sole']}, so when it tips is not "
+            "either: give --sole X0:X1:Y0:Y1.",
+            err=True,
+        )
+    if summary["output"]:
+        echo_written(summary["output"])

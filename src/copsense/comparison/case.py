@@ -1,0 +1,141 @@
+"""Case: robot, posture, controller, conditions and trial, one frozen value with a stable key."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
+from importlib.metadata import PackageNotFoundError, version
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from copsense._version import __version__
+from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
+from copsense.comparison.trials import Falls, Trial
+from copsense.controllers import controller_code
+from copsense.errors import InvalidInputError
+from copsense.robots import PRESETS
+
+IDEAL = Conditions()
+
+
+@dataclass(frozen=True)
+class Case:
+    """One robot in one posture under one controller in some conditions, put through one trial.
+
+    Attributes:
+        robot: which, on which soles.
+        posture: how it stands.
+        controller: what balances it.
+        trial: what it is put through.
+        conditions: what disturbs it.
+        trial_name: what to call the trial; default its kind.
+    """
+
+    robot: RobotChoice
+    posture: PostureChoice
+    controller: ControllerChoice
+    trial: Trial
+    conditions: Conditions = IDEAL
+    trial_name: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse to count falls without limits."""
+        object.__setattr__(self, "trial_name", self.trial_name or self.trial.kind)
+        if isinstance(self.trial, Falls) and not self.controller.limited:
+            raise InvalidInputError(
+                f"falls of {self.controller.name!r} cannot be scored: without limits a robot that "
+                "has tipped falls or not by chance. Give limits (--limits), or leave falls out."
+            )
+
+    @property
+    def label(self) -> tuple[str, str, str, str, str]:
+        """Names of robot, posture, controller, conditions and trial."""
+        return (
+            self.robot.name,
+            self.posture.name,
+            self.controller.name,
+            self.conditions.name,
+            self.trial_name,
+        )
+
+    @cached_property
+    def parameters(self) -> dict[str, Any]:
+        """Everything that the scores depend on, as plain data."""
+        parts = ("robot", "posture", "controller", "trial", "conditions")
+        found = {name: plain(getattr(self, name)) for name in parts}
+        if self.robot.source not in PRESETS and Path(self.robot.source).is_file():
+            content = Path(self.robot.source).read_bytes()
+            found["robot"]["content"] = hashlib.sha256(content).hexdigest()[:12]
+        if self.controller.source:
+            content = controller_code(self.controller.source)
+            found["controller"]["content"] = hashlib.sha256(content).hexdigest()[:12]
+        return found | {"software": _software()}
+
+    @cached_property
+    def key(self) -> str:
+        """A short name that is the same for the same parameters, in every process."""
+        text = json.dumps(self.parameters, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def make_plan(
+    robots: Sequence[RobotChoice],
+    postures: Sequence[PostureChoice],
+    controllers: Sequence[ControllerChoice],
+    trials: Sequence[Trial] | Mapping[str, Trial],
+    conditions: Sequence[Conditions] = (IDEAL,),
+) -> tuple[Case, ...]:
+    """Every robot in every posture under every controller in all conditions and trials.
+
+    Args:
+        robots: which robots.
+        postures: how they stand.
+        controllers: what balances them.
+        trials: what they are put through; a mapping names them.
+        conditions: what disturbs them.
+    """
+    named = trials if isinstance(trials, Mapping) else {trial.kind: trial for trial in trials}
+    return tuple(
+        Case(robot, posture, controller, trial, condition, name)
+        for robot, posture, condition, (name, trial), controller in product(
+            robots, postures, conditions, named.items(), controllers
+        )
+    )
+
+
+def plain(value: Any) -> Any:
+    """Values, tuples and mappings of numbers and words as what JSON can hold.
+
+    Raises:
+        InvalidInputError: something that is no value.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        return {"is": type(value).__name__} | {
+            f.name: plain(getattr(value, f.name)) for f in fields(value) if f.init
+        }
+    if isinstance(value, Mapping):
+        return {str(name): plain(part) for name, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(part) for part in value]
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, int | float):
+        return float(value)  # 1 and 1.0 are the same parameter
+    raise InvalidInputError(
+        f"{value!r} cannot be part of a benchmark's case. Give numbers, words and values such as "
+        "Motors(delay=0.005)."
+    )
+
+
+def _software() -> dict[str, str]:
+    found = {"copsense": __version__}
+    for package in ("mujoco", "pin"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # rows will say that it is missing
+            found[package] = ""
+    return found

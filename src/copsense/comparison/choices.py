@@ -1,0 +1,207 @@
+"""Choices: the robots, postures, controllers and conditions that a benchmark compares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from copsense.arrays import finite_number
+from copsense.contact import Contact, rectangle
+from copsense.controllers import STIFF, Gains, public_gains
+from copsense.criterion import Criterion, criterion_named
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.limits import Limits
+from copsense.robot import Robot
+from copsense.robots import PRESETS, load_robot, load_stance
+from copsense.simulation import Scenario
+from copsense.stance import Stance
+
+# robot -> (hip pitch, knee, ankle pitch) of both legs, and their share of the knees' bend
+_LEGS: dict[str, tuple[tuple[str, float], ...]] = {
+    "icub": tuple(
+        (f"{side}_{joint}", share)
+        for side in "lr"
+        for joint, share in (("hip_pitch", 0.5), ("knee", -1.0), ("ankle_pitch", -0.5))
+    ),
+    "talos": tuple(
+        (f"leg_{side}_{number}_joint", share)
+        for side in ("left", "right")
+        for number, share in ((3, -0.5), (4, 1.0), (5, -0.5))
+    ),
+    "romeo": tuple(
+        (f"{side}{joint}", share)
+        for side in "LR"
+        for joint, share in (("HipPitch", -0.5), ("KneePitch", 1.0), ("AnklePitch", -0.5))
+    ),
+    "g1": tuple(
+        (f"{side}_{joint}_joint", share)
+        for side in ("left", "right")
+        for joint, share in (("hip_pitch", -0.5), ("knee", 1.0), ("ankle_pitch", -0.5))
+    ),
+}
+_GAINS = ("stiff", "public")
+
+
+@dataclass(frozen=True)
+class RobotChoice:
+    """A robot and its soles.
+
+    Attributes:
+        source: a preset's name, or the path of a URDF or MJCF.
+        name: what to call it; default the source.
+        contacts: frames of its contacts; default the preset's.
+        soles: frame -> rectangle (x0, x1, y0, y1) in the contact frame [m], instead of the
+            collision geometry's.
+        sole_height: of the contact plane over the model's frames, along its normal [m]; for the
+            contacts of `soles`.
+    """
+
+    source: str
+    name: str = ""
+    contacts: tuple[str, ...] = ()
+    soles: Mapping[str, tuple[float, float, float, float]] | None = None
+    sole_height: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Name it, and refuse soles that are none."""
+        object.__setattr__(self, "name", self.name or Path(self.source).stem)
+        object.__setattr__(self, "contacts", tuple(self.contacts))
+        finite_number(self.sole_height, f"the sole height of robot {self.name!r} [m]")
+        for frame, sole in (self.soles or {}).items():
+            numbers = [finite_number(x, f"the sole of {frame} [m]") for x in sole]
+            if len(numbers) != 4 or not (numbers[0] < numbers[1] and numbers[2] < numbers[3]):
+                raise InvalidInputError(
+                    f"the sole of {frame} is {sole!r}. Give four numbers [m], x0 < x1 and y0 < y1."
+                )
+
+    def stance(self, posture: PostureChoice) -> Stance:
+        """The robot standing in a posture.
+
+        Raises:
+            CopsenseError: it cannot be loaded, or cannot stand so.
+        """
+        robot: str | Robot = self.source if self.source in PRESETS else load_robot(self.source)
+        contacts: list[str | Contact] | None = list(self.contacts) or None
+        if self.soles:
+            known = PRESETS[self.source].contacts if self.source in PRESETS else ()
+            contacts = []
+            for frame, (x0, x1, y0, y1) in self.soles.items():
+                own = next((c for c in known if c.frame == frame), Contact(frame))
+                x, y, z = (float(c) * self.sole_height for c in own.rotation[:, 2])
+                sole = rectangle((float(x0), float(x1)), (float(y0), float(y1)))
+                contacts.append(replace(own, polygon=sole, offset=(x, y, z)))
+        return load_stance(
+            robot, contacts=contacts, posture=posture.angles(self.source), width=posture.width
+        )
+
+
+@dataclass(frozen=True)
+class PostureChoice:
+    """How a robot stands.
+
+    Attributes:
+        name: what to call it.
+        knees: bend of both knees [rad], the hips and ankles level the soles; None leaves the legs
+            as the preset has them.
+        width: between the feet [m], or None.
+        joints: joint -> position that the posture stays nearest to [rad].
+    """
+
+    name: str = "own"
+    knees: float | None = None
+    width: float | None = None
+    joints: Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no posture."""
+        if self.knees is not None:
+            finite_number(self.knees, f"the knees' bend of posture {self.name!r} [rad]")
+        if self.width is not None:
+            finite_number(self.width, f"the width of posture {self.name!r} [m]", positive=True)
+
+    def angles(self, robot: str) -> dict[str, float]:
+        """Joint -> position [rad] for a robot.
+
+        Raises:
+            UnknownNameError: knees are asked of a robot whose legs are not known here.
+        """
+        angles: dict[str, float] = {}
+        if self.knees is not None:
+            if robot not in _LEGS:
+                raise UnknownNameError(
+                    "robot whose knees are known", robot, _LEGS, "Or give joints in a plan file."
+                )
+            angles = {joint: share * self.knees for joint, share in _LEGS[robot]}
+        return angles | dict(self.joints or {})
+
+
+@dataclass(frozen=True)
+class ControllerChoice:
+    """A balancing controller.
+
+    Attributes:
+        criterion: the name of the criterion that shares the load.
+        characteristic_length: L of minimum-wrench [m].
+        gains: ``"stiff"`` or ``"public"``.
+        limits: what the contact wrenches and torques must respect, or None.
+        name: what to call it; default the criterion, "within limits" where there are some.
+        source: ``MODULE:ATTRIBUTE`` of a callable stance -> controller, instead of the balancing
+            controller; `criterion` and `limits` are then what the prediction assumes.
+    """
+
+    criterion: str = "minimum-torque"
+    characteristic_length: float = 1.0
+    gains: str = "stiff"
+    limits: Limits | None = None
+    name: str = ""
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        """Name it, and refuse names that mean nothing."""
+        criterion_named(self.criterion, self.characteristic_length)
+        if self.gains not in _GAINS:
+            raise UnknownNameError("set of gains", self.gains, _GAINS)
+        if self.source and not all(self.source.rpartition(":")):
+            raise InvalidInputError(
+                f"the controller {self.source!r} is not understood. Give MODULE:ATTRIBUTE, a "
+                "callable stance -> controller."
+            )
+        usual = (self.source or self.criterion) + (" within limits" if self.limited else "")
+        object.__setattr__(self, "name", self.name or usual)
+
+    @property
+    def limited(self) -> bool:
+        """Whether anything is limited."""
+        return self.limits is not None and self.limits.any
+
+    @property
+    def law(self) -> Criterion:
+        """The criterion itself."""
+        return criterion_named(self.criterion, self.characteristic_length)
+
+    def gains_of(self, robot: Robot) -> Gains:
+        """The gains for a robot."""
+        return STIFF if self.gains == "stiff" else public_gains(robot)
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What disturbs every run of a case.
+
+    Attributes:
+        name: what to call them.
+        values: fields of `copsense.simulation.Scenario` and their values, such as
+            ``{"motors": Motors(delay=0.005)}``.
+    """
+
+    name: str = "ideal"
+    values: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no field of a scenario, or the trial's own affair."""
+        known = [f.name for f in fields(Scenario) if f.name not in ("duration", "reference")]
+        for name in self.values or {}:
+            if name not in known:
+                raise UnknownNameError("field of a scenario", name, known)

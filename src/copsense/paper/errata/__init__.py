@@ -1,0 +1,1 @@
+"""Where the paper's printed text differs from what holds."""

@@ -1,0 +1,16 @@
+"""The report on a reproduction: one self-contained HTML file, its figures and data beside it."""
+
+from __future__ import annotations
+
+from copsense.paper.report.page import render_page
+from copsense.paper.report.report_figure import ReportFigure
+from copsense.paper.report.report_folder import check_report_folder, write_report
+from copsense.paper.report.static_figures import report_figures
+
+__all__ = [
+    "ReportFigure",
+    "check_report_folder",
+    "render_page",
+    "report_figures",
+    "write_report",
+]

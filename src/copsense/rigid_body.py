@@ -1,0 +1,180 @@
+"""Rigid body: what Pinocchio computes of a robot at a configuration, as arrays of one's own.
+
+Pinocchio computes in a working memory (``pin.Data``), which takes longer to make than any of these
+functions to run. One is kept for each robot and thread; none of it leaves this module, and nothing
+in it outlives a call.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping, Sequence
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.arrays import owned
+from copsense.robot import Robot
+
+# Where something is attached to a robot: a joint of the model, and the placement on it.
+Attachment = tuple[int, pin.SE3]
+_LOCAL = pin.ReferenceFrame.LOCAL
+
+
+class _Scratch:
+    """Working memory for one robot in one thread."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.model = robot.model
+        self.data = robot.model.createData()
+        self.still = np.zeros(robot.model.nv)
+        self.forces = pin.StdVec_Force()
+        self.forces.extend([pin.Force.Zero()] * robot.model.njoints)
+        self._tilted: pin.Model | None = None
+
+    def tilted(self, gravity: Float[np.ndarray, " 3"]) -> pin.Model:
+        """The model with another gravity [m/s^2]."""
+        if self._tilted is None:
+            self._tilted = self.model.copy()
+        self._tilted.gravity.linear = gravity
+        return self._tilted
+
+
+class _Scratches(threading.local):
+    """The working memories of a thread; each goes with its robot."""
+
+    def __init__(self) -> None:
+        self.of: WeakKeyDictionary[Robot, _Scratch] = WeakKeyDictionary()
+
+
+_kept = _Scratches()
+
+
+def _scratch(robot: Robot) -> _Scratch:
+    found = _kept.of.get(robot)
+    if found is None:
+        found = _kept.of[robot] = _Scratch(robot)
+    return found
+
+
+def place(
+    robot: Robot, q: Float[np.ndarray, " nq"], attachments: Sequence[Attachment]
+) -> tuple[tuple[pin.SE3, ...], Float[np.ndarray, "k 6 nv"]]:
+    """World placement of frames, and their Jacobians in their own axes (linear, angular)."""
+    memory = _scratch(robot)
+    model, data = memory.model, memory.data
+    pin.computeJointJacobians(model, data, q)
+    placements, jacobians = [], np.empty((len(attachments), 6, model.nv))
+    for k, (joint, placement) in enumerate(attachments):
+        placements.append(data.oMi[joint] * placement)
+        jacobians[k] = pin.getFrameJacobian(model, data, joint, placement, _LOCAL)
+    return tuple(placements), jacobians
+
+
+def base_axes(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, "3 nb"]:
+    """Angular velocity of the base by its own velocities, in world axes."""
+    memory, world = _scratch(robot), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    pin.computeJointJacobians(memory.model, memory.data, q)
+    return owned(pin.getJointJacobian(memory.model, memory.data, 1, world)[3:, : robot.base_nv])
+
+
+def gravity(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " nv"]:
+    """Generalised gravity G(q) [N, Nm]."""
+    memory = _scratch(robot)
+    return owned(pin.computeGeneralizedGravity(memory.model, memory.data, q))
+
+
+def com(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " 3"]:
+    """Centre of mass in the world [m]."""
+    memory = _scratch(robot)
+    return owned(pin.centerOfMass(memory.model, memory.data, q))
+
+
+def com_jacobian(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, "3 nv"]:
+    """Jacobian of the centre of mass, world axes."""
+    memory = _scratch(robot)
+    return owned(pin.jacobianCenterOfMass(memory.model, memory.data, q))
+
+
+def mass_matrix(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, "nv nv"]:
+    """Joint-space inertia M(q), symmetric."""
+    memory = _scratch(robot)
+    return owned(pin.crba(memory.model, memory.data, q, pin.Convention.WORLD))
+
+
+def torques_at_rest(
+    robot: Robot, q: Float[np.ndarray, " nq"], forces: Mapping[int, pin.Force]
+) -> Float[np.ndarray, " nv"]:
+    """G(q) less the generalised forces of spatial forces on joints, in their own axes.
+
+    By inverse dynamics: it shares no step with `gravity` and the contacts' Jacobian.
+    """
+    memory = _scratch(robot)
+    with _Applied(memory, forces):
+        still = memory.still
+        return owned(pin.rnea(memory.model, memory.data, q, still, still, memory.forces))
+
+
+def static_torque_derivative(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    forces: Mapping[int, pin.Force],
+    gravity: Float[np.ndarray, " 3"] | None = None,
+) -> Float[np.ndarray, "nv nv"]:
+    """d(G - J' f)/dq at spatial forces on joints that turn with them.
+
+    Args:
+        robot: the robot.
+        q: configuration (nq,).
+        forces: joint of the model -> force in the joint's axes.
+        gravity: another gravity than the model's (3,) [m/s^2].
+    """
+    memory = _scratch(robot)
+    model = memory.model if gravity is None else memory.tilted(gravity)
+    with _Applied(memory, forces):
+        found = pin.computeStaticTorqueDerivatives(model, memory.data, q, memory.forces)
+        return np.array(found)
+
+
+def velocity_derivatives(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    velocity: Float[np.ndarray, " nv"],
+    attachments: Sequence[Attachment],
+) -> Float[np.ndarray, "k 6 nv"]:
+    """d(J v)/dq at fixed v for the local Jacobian J of each attached frame."""
+    memory = _scratch(robot)
+    model, data = memory.model, memory.data
+    pin.computeForwardKinematicsDerivatives(model, data, q, velocity, memory.still)
+    found = np.empty((len(attachments), 6, model.nv))
+    for k, (joint, placement) in enumerate(attachments):
+        found[k] = pin.getFrameVelocityDerivatives(model, data, joint, placement, _LOCAL)[0]
+    return found
+
+
+def inertia_derivative(
+    robot: Robot, q: Float[np.ndarray, " nq"], acceleration: Float[np.ndarray, " nv"]
+) -> Float[np.ndarray, "nv nv"]:
+    """d(M a)/dq at fixed a."""
+    memory = _scratch(robot)
+    model, data = memory.model, memory.data
+    at_rest = np.array(pin.computeGeneralizedGravityDerivatives(model, data, q))
+    moving = pin.computeRNEADerivatives(model, data, q, memory.still, acceleration)[0]
+    return np.asarray(moving - at_rest)
+
+
+class _Applied:
+    """The working memory's forces, set for the length of a block and then zero again."""
+
+    def __init__(self, memory: _Scratch, forces: Mapping[int, pin.Force]) -> None:
+        self.memory, self.given = memory, forces
+
+    def __enter__(self) -> None:
+        for joint, force in self.given.items():
+            self.memory.forces[joint] = force
+
+    def __exit__(self, *_: object) -> None:
+        for joint in self.given:
+            self.memory.forces[joint].setZero()

@@ -1,0 +1,151 @@
+"""EventDetector: when a rollout is over, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from copsense.arrays import finite_number
+from copsense.simulation.simulator import Snapshot
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What counts as the end.
+
+    Attributes:
+        tilt: a sole turned by more has tipped [rad].
+        lift: a contact's origin higher above its plane has left it [m].
+        slip: a contact of which a corner (or the point) is farther from its place along the plane
+            has slipped [m].
+        fall: the CoM lower than this share of its height at the start is a fall.
+        base_tilt: so is a base turned by more [rad].
+        speed: a joint faster than this is a motion that has diverged [rad/s, m/s].
+    """
+
+    tilt: float = 0.00873  # 0.5 degrees
+    lift: float = 2e-3
+    slip: float = 2e-2
+    fall: float = 0.75
+    base_tilt: float = 0.785
+    speed: float = 200.0
+
+    def __post_init__(self) -> None:
+        """Refuse a threshold that everything or nothing passes."""
+        for name in ("tilt", "lift", "slip", "fall", "base_tilt", "speed"):
+            finite_number(getattr(self, name), f"the threshold {name}", positive=True)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that may end a rollout.
+
+    Attributes:
+        kind: ``"tip"``, ``"lift"``, ``"slip"``, ``"fall"``, ``"diverged"``, ``"engine"``,
+            ``"controller"`` or ``"stopped"``.
+        time: [s].
+        message: what happened, in words.
+        contact: the contact concerned, or nothing.
+    """
+
+    kind: str
+    time: float
+    message: str
+    contact: str = ""
+
+
+class EventDetector:
+    """Looks at every snapshot of one rollout."""
+
+    def __init__(self, stance: Stance, thresholds: Thresholds) -> None:
+        """Remember where everything stands."""
+        self._names, self._limits = stance.contact_names, thresholds
+        self._normals = np.array([p.rotation[:, 2] for p in stance.placements])
+        self._origins = np.array([p.translation for p in stance.placements])
+        self._turns = np.array([c.kind != "point" for c in stance.contacts])
+        self._axes = np.array([p.rotation for p in stance.placements])
+        self._corners = [
+            np.zeros((1, 2)) if c.kind == "point" or c.polygon is None else np.array(c.polygon)
+            for c in stance.contacts
+        ]
+        self._reach = np.array([np.linalg.norm(c, axis=1).max() for c in self._corners])
+        self._ground = float(self._origins[:, 2].mean())
+        self._height = float(stance.com[2]) - self._ground
+        self._base = stance.q[3:7]
+        self._joints = stance.robot.torque_names
+        self._model = stance.robot.model
+        self._data = self._model.createData()
+
+    def contact_event(self, now: Snapshot) -> Event | None:
+        """The first contact that does not stand any more, if any."""
+        tilts = self.tilts(now)
+        lifts = np.einsum("ij,ij->i", now.positions - self._origins, self._normals)
+        for k, name in enumerate(self._names):
+            if self._turns[k] and tilts[k] > self._limits.tilt:
+                side = "" if now.wrenches[k, 2] > 0 else ", unloaded"
+                message = f"{name} tipped: turned by {np.degrees(tilts[k]):.2f} deg{side}"
+                return Event("tip", now.time, message, name)
+            if lifts[k] > self._limits.lift:
+                message = f"{name} left the ground by {lifts[k] * 1e3:.1f} mm"
+                return Event("lift", now.time, message, name)
+        slips = self.slips(now)
+        k = int(np.argmax(slips))
+        if slips[k] > self._limits.slip:
+            message = (
+                f"{self._names[k]} slipped by {slips[k] * 1e3:.1f} mm, more than "
+                f"{self._limits.slip * 1e3:g} mm"
+            )
+            return Event("slip", now.time, message, self._names[k])
+        return None
+
+    def slips(self, now: Snapshot) -> np.ndarray:
+        """How far each contact's farthest corner is from its place along the plane (nc,) [m].
+
+        An upper bound, where even that is under the threshold.
+        """
+        moved = now.positions - self._origins
+        heading = np.abs((now.rotations[:, :, 0] * self._axes[:, :, 1]).sum(axis=1))
+        # A chord is at most sqrt(2) times as long as the sine of a turn up to 90 degrees says.
+        found = np.sqrt((moved * moved).sum(axis=1)) + 1.5 * self._reach * heading
+        for k in np.flatnonzero(found > self._limits.slip):
+            turned = (now.rotations[k] - self._axes[k])[:, :2] @ self._corners[k].T
+            across = self._axes[k][:, :2].T @ (moved[k][:, None] + turned)
+            found[k] = np.linalg.norm(across, axis=0).max()
+        return found
+
+    def tilts(self, now: Snapshot) -> np.ndarray:
+        """Angle of each contact frame's z axis from its plane's normal (nc,) [rad]."""
+        z = now.rotations[:, :, 2]
+        along = np.einsum("ij,ij->i", z, self._normals)
+        across = np.linalg.norm(z - along[:, None] * self._normals, axis=1)
+        return np.where(self._turns, np.arctan2(across, along), 0.0)
+
+    def com(self, now: Snapshot) -> np.ndarray:
+        """Centre of mass (3,), world [m]."""
+        return np.array(pin.centerOfMass(self._model, self._data, now.q))
+
+    def end_event(self, now: Snapshot, com_height: float) -> Event | None:
+        """A fall or a divergence, after which nothing more can be learnt."""
+        fastest = int(np.argmax(np.abs(now.v[6:]))) if len(now.v) > 6 else -1
+        speed = float(now.v[6 + fastest]) if fastest >= 0 else 0.0
+        if abs(speed) > self._limits.speed:
+            return Event(
+                "diverged",
+                now.time,
+                f"the motion diverged: joint {self._joints[fastest]} moves at {speed:.0f} rad/s; "
+                "the gains are unstable, a push was too strong, or a foot has lost the ground",
+            )
+        height = com_height - self._ground
+        if height < self._limits.fall * self._height:
+            return Event("fall", now.time, f"fell: the CoM is {height:.3f} m over the ground")
+        # |cos| of half the angle between two unit quaternions.
+        cosine = min(1.0, abs(float(self._base @ now.q[3:7])))
+        turned = 2.0 * np.arccos(cosine)
+        if turned > self._limits.base_tilt:
+            return Event(
+                "fall", now.time, f"fell: the base has turned {np.degrees(turned):.0f} deg"
+            )
+        return None

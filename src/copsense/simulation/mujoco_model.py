@@ -1,0 +1,155 @@
+"""The MuJoCo model of a stance, written from its Pinocchio model.
+
+Written rather than read from the robot's file, so that locked joints, replaced inertias and robots
+without a file need no second reading.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from copsense.contact import Contact
+from copsense.errors import InvalidInputError
+from copsense.robot import Robot
+from copsense.simulation.physics_settings import PhysicsSettings
+from copsense.simulation.support_points import support_points
+from copsense.stance import Stance
+
+_POINT = 1e-4  # m: radius of the ball at each support point
+# m: how deep each starts in the ground. A contact that only touches is not felt in the first step,
+# and the torques meant for a foot that is held spin one that is not.
+_PRESSED = 1e-6
+_HINGES = ("JointModelR",)
+_SLIDES = ("JointModelP",)
+
+
+def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, sensors: bool) -> Any:
+    """The compiled MuJoCo model of a stance."""
+    robot, model = stance.robot, stance.robot.model
+    if model.joints[1].shortname() != "JointModelFreeFlyer":
+        raise InvalidInputError(
+            f"robot {robot.name!r} lives in a plane: a simulation is spatial. Use a robot with a "
+            "free-floating base."
+        )
+    spec = mujoco.MjSpec()
+    spec.compiler.autolimits = False
+    option = spec.option
+    option.timestep, option.gravity = settings.time_step, model.gravity.linear
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio, option.tolerance, option.iterations = settings.impedance_ratio, 1e-10, 100
+    # A fall must not start over in silence.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    bodies = {0: spec.worldbody}
+    for i in range(1, model.njoints):
+        bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])
+    for contact, world in zip(stance.contacts, stance.placements, strict=True):
+        _add_contact(mujoco, spec, bodies, robot, contact, world, settings)
+        for kind in ("FORCE", "TORQUE") if sensors else ():
+            spec.add_sensor(
+                name=f"{kind.lower()} of {contact.name}",
+                type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                objname=f"contact {contact.name}",
+            )
+    try:
+        return spec.compile()
+    except ValueError as error:
+        # Its remedies are options of MuJoCo's own files.
+        reason, _, where = str(error).strip().removeprefix("Error: ").partition("\n")
+        named = re.search(r"'body (.+)'", where)
+        link = f" of the link behind joint {named[1]!r}" if named else ""
+        raise InvalidInputError(
+            f"MuJoCo cannot simulate robot {robot.name!r}: {reason.split(';')[0]}{link}. Give its "
+            "links physical masses and inertias."
+        ) from None
+
+
+def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
+    """The body behind a joint of the model, with that joint."""
+    model = robot.model
+    place, inertia, joint = model.jointPlacements[i], model.inertias[i], model.joints[i]
+    body = parent.add_body(name=f"body {model.names[i]}", pos=place.translation, quat=_wxyz(place))
+    body.explicitinertial = True
+    body.mass, body.ipos = inertia.mass, inertia.lever
+    at_com = inertia.inertia
+    body.fullinertia = [*np.diag(at_com), at_com[0, 1], at_com[0, 2], at_com[1, 2]]
+    if i == 1:
+        body.add_freejoint()
+        return body
+    kind, subspace = joint.shortname(), np.ravel(joint.createData().S)
+    if not kind.startswith((*_HINGES, *_SLIDES)) or joint.nv != 1 or not _unit(subspace):
+        raise InvalidInputError(
+            f"joint {model.names[i]!r} of robot {robot.name!r} is a {kind}, which cannot be "
+            "simulated. Lock it: robot.keeping([...])."
+        )
+    hinge = bool(np.any(subspace[3:]))
+    body.add_joint(
+        name=model.names[i],
+        type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=subspace[3:] if hinge else subspace[:3],
+        armature=float(model.armature[joint.idx_v]),
+    )
+    return body
+
+
+def _unit(subspace: np.ndarray) -> bool:
+    """Whether a motion is a pure turn or slide of unit rate."""
+    parts = np.linalg.norm(subspace[:3]), np.linalg.norm(subspace[3:])
+    return bool(np.isclose(max(parts), 1.0) and np.isclose(min(parts), 0.0))
+
+
+def _add_contact(
+    mujoco: Any,
+    spec: Any,
+    bodies: dict[int, Any],
+    robot: Robot,
+    contact: Contact,
+    world: pin.SE3,
+    settings: PhysicsSettings,
+) -> None:
+    """A contact's frame, its support points and the plane that they stand on."""
+    frame = robot.frame(contact.frame)
+    body = bodies[frame.parentJoint]
+    place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+    body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=_wxyz(place))
+    up = world.rotation[:, 2]
+    point = contact.kind == "point"
+    spec.worldbody.add_geom(
+        name=f"plane under {contact.name}",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 1.0],
+        # A point's ball is centred on the point; a sole's balls stand on the sole.
+        pos=world.translation + (_PRESSED - (_POINT if point else 0.0)) * up,
+        quat=_wxyz(world),
+        contype=0,
+        conaffinity=0,
+    )
+    friction = settings.friction if contact.friction is None else contact.friction
+    for number, (x, y) in enumerate(support_points(contact, settings.sole_detail)):
+        name = f"{contact.name} | {number}"
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[_POINT, 0.0, 0.0],
+            pos=place.act(np.array([x, y, 0.0 if point else _POINT])),
+            mass=0.0,
+            contype=0,
+            conaffinity=0,
+        )
+        spec.add_pair(
+            geomname1=f"plane under {contact.name}",
+            geomname2=name,
+            condim=3,
+            friction=[friction, friction, 0.0, 0.0, 0.0],
+            solref=[settings.contact_time, 1.0],
+        )
+
+
+def _wxyz(place: pin.SE3) -> list[float]:
+    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
+    return [w, x, y, z]

@@ -1,0 +1,312 @@
+"""The report is one page that needs nothing else, whole or not there, the same for the same."""
+
+import csv
+import json
+import re
+import shlex
+from html.parser import HTMLParser
+
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from support.reproductions import small_reproduction
+
+import copsense
+from copsense.cli import copsense as command_line
+from copsense.errors import OutputError
+from copsense.paper import Verdict
+from copsense.paper.report import (
+    check_report_folder,
+    render_page,
+    report_figures,
+    report_folder,
+    write_report,
+)
+from copsense.paper.report.page import number
+from copsense.paper.report.typesetting import typeset
+from copsense.paper.report.words import commands, summary
+from copsense.plots import render_figure
+
+COMMAND = "copsense reproduce --postures 21"
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, and text by the tag it stands in."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.open, self.text = [], [], {}
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+        if tag not in ("img", "meta", "link"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, "tags are not nested"
+
+    def handle_data(self, data):
+        for tag in set(self.open):
+            self.text.setdefault(tag, []).append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.tags if name == tag]
+
+
+@pytest.fixture(scope="module")
+def reproduction():
+    return small_reproduction()
+
+
+@pytest.fixture(scope="module")
+def folder(reproduction, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("written") / "deep" / "report"
+    assert write_report(reproduction, folder, command=COMMAND) == folder / "report.html"
+    return folder
+
+
+@pytest.fixture(scope="module")
+def text(folder):
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Pictures that cost nothing, for what is not about them."""
+    monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")
+
+
+def read_table(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+# --- the page -----------------------------------------------------------------------------------
+
+
+def test_the_page_is_well_formed_and_has_one_title(page):
+    assert page.open == []
+    assert len(page.all("h1")) == 1
+    assert len(page.all("title")) == 1
+    assert page.all("html") == [{"lang": "en"}]
+
+
+def test_the_page_needs_nothing_from_elsewhere(page, text):
+    assert page.all("script") == []
+    assert all(link["href"].startswith("data:") for link in page.all("link"))
+    assert all(img["src"].startswith("data:image/svg+xml;base64,") for img in page.all("img"))
+    assert "@import" not in text
+    assert "url(" not in re.sub(r"data:[^\"]*", "", text)
+    outside = [a["href"] for a in page.all("a") if not a["href"].startswith("#")]
+    assert outside == ["https://arxiv.org/abs/1610.01495"]
+
+
+def test_links_within_the_page_lead_somewhere(page):
+    names = {attributes.get("id") for _, attributes in page.tags}
+    for a in page.all("a"):
+        if a["href"].startswith("#"):
+            assert a["href"][1:] in names
+
+
+def test_every_figure_has_a_picture_a_caption_and_words_for_it(page, reproduction):
+    figures = report_figures(reproduction)
+    assert [f["id"] for f in page.all("figure")] == [f.name for f in figures]
+    assert len(page.all("img")) == len(page.all("figcaption")) == len(figures)
+    assert all(len(img["alt"]) > 30 for img in page.all("img"))
+    for number_ in ("3a", "3b", "4", "5", "6a", "6b", "7a", "7b", "8", "9a", "9b"):
+        assert f"figure_{number_}" in {f.name for f in figures}
+
+
+def test_every_claim_is_on_the_page_with_its_verdict(text, reproduction):
+    for claim in reproduction.claims:
+        (row,) = re.findall(
+            rf'<tr id="claim-{claim.claim.identifier}">(.*?)</tr>', text, flags=re.DOTALL
+        )
+        (badge,) = re.findall(r'<span class="badge [a-z]+">.*?</span> ([a-z ]+)</span>', row)
+        assert badge == claim.verdict.value
+        assert ("Condition:" in row) <= (claim.verdict is Verdict.HOLDS_IF)
+
+
+def test_the_summary_has_the_numbers(reproduction):
+    first, second, third = summary(reproduction)
+    assert "0.506 against 0.995" in first
+    assert "0.07 m instead of 1 m" in second
+    counts = [int(n) for n in re.findall(r"\d+", third)]
+    assert counts[0] == len(reproduction.claims) == sum(counts[1:4])
+
+
+def test_every_erratum_reference_value_and_version_is_on_the_page(page, text, reproduction):
+    words = " ".join("".join(page.text["body"]).split())
+    assert len(page.all("table")) == 5
+    cells = sum(tag == "tr" for tag, _ in page.tags)
+    bindings = reproduction.within_limits.bindings
+    rows = (reproduction.claims, reproduction.errata, reproduction.references, bindings)
+    assert cells == 5 + sum(len(r) for r in rows)
+    for name, version in reproduction.versions.items():
+        assert f"<dt>{name}</dt><dd>{version}</dd>" in text
+    assert "amplitude" in words
+    assert COMMAND in words
+
+
+def test_the_same_reproduction_gives_the_same_page(reproduction, text):
+    figures = report_figures(reproduction)
+    pictures = {f.name: render_figure(f.draw(), ".svg") for f in figures}
+    assert render_page(reproduction, pictures, figures, command=COMMAND) == text
+
+
+def test_what_the_user_typed_is_shown_and_not_interpreted(reproduction):
+    figures = report_figures(reproduction)
+    found = render_page(
+        reproduction, {f.name: b"" for f in figures}, figures, command="copsense <img src=x> & 'a'"
+    )
+    assert "copsense &lt;img src=x&gt; &amp; &#39;a&#39;" in found
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (0.0458157, "m", "45.82 mm"),
+        (1.5, "m", "1.5 m"),
+        (0.5, "1", "0.5"),
+        (-0.385774, "m/rad", "-0.3858 m/rad"),
+        (5.5e-7, "m g", "5.5e-07 m g"),
+        (9.9e-17, "1", "1e-16"),
+        (0.0, "1", "0"),
+    ],
+)
+def test_numbers_are_written_to_be_read(value, unit, shown):
+    assert number(value, unit) == shown
+
+
+@pytest.mark.parametrize(
+    ("plain", "shown"),
+    [
+        ("Delta xi = 0", "Δξ = 0"),
+        ("eta_R and f_z", "η<sub>R</sub> and f<sub>z</sub>"),
+        ("l_hip_roll, l_sole", "l_hip_roll, l_sole"),
+        ("M^-1 and A^+ A", "M<sup>−1</sup> and A<sup>+</sup> A"),
+        ("1e-09, 2.5e+05", "10<sup>−9</sup>, 2.5·10<sup>5</sup>"),
+        ("a < b & d << 2 L", "a &lt; b &amp; d ≪ 2 L"),
+        ("maximum beta dxi", "maximum beta dξ"),
+        ("<script>", "&lt;script&gt;"),
+    ],
+)
+def test_plain_text_is_typeset_and_escaped(plain, shown):
+    assert str(typeset(plain)) == shown
+
+
+# --- what lies beside it ------------------------------------------------------------------------
+
+
+def test_each_figure_lies_beside_as_png_and_svg(folder, reproduction):
+    names = {f.name for f in report_figures(reproduction)}
+    found = {path.name for path in (folder / "figures").iterdir()}
+    assert found == {f"{name}.{kind}" for name in names for kind in ("png", "svg")}
+    assert all((folder / "figures" / f"{n}.png").read_bytes()[:4] == b"\x89PNG" for n in names)
+
+
+def test_the_data_lie_beside_and_read_back(folder, reproduction):
+    data = folder / "data"
+    xr.testing.assert_identical(
+        copsense.load_results(data / "icub_lateral.nc"), reproduction.lateral
+    )
+    xr.testing.assert_identical(
+        copsense.load_results(data / "icub_lateral_at_sole.nc"), reproduction.lateral_at_sole
+    )
+    claims = json.loads((data / "claims.json").read_text(encoding="utf-8"))
+    assert [(c["identifier"], c["verdict"], c["number"]) for c in claims] == [
+        (c.claim.identifier, c.verdict.value, c.number) for c in reproduction.claims
+    ]
+    assert len(json.loads((data / "errata.json").read_text())) == len(reproduction.errata)
+    assert all(row["agrees"] for row in json.loads((data / "reference.json").read_text())[:16])
+    assert "seconds" in json.loads((data / "setting.json").read_text())
+    assert {row["figure"] for row in read_table(data / "four_bar.csv")} == {"3a", "3b", "4", "5"}
+    assert len(read_table(data / "icub_lateral.csv")) == reproduction.postures * 3 * 2
+
+
+def test_the_commands_shown_run(reproduction, tmp_path, monkeypatch):
+    """Each as the page shows it, with fewer postures."""
+    monkeypatch.chdir(tmp_path)
+    shown = commands(reproduction, COMMAND)
+    assert shown.pop("all") == (COMMAND,)
+    for line in [line for lines in shown.values() for line in lines]:
+        program, *arguments = shlex.split(line.replace(":21 ", ":5 "))
+        assert program == "copsense"
+        result = CliRunner().invoke(command_line, arguments)
+        assert result.exit_code == 0, (line, result.output)
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def test_a_report_is_not_overwritten_unasked(folder, reproduction, quick):
+    before = (folder / "report.html").read_bytes()
+    with pytest.raises(OutputError, match=r"report\.html, figures, data already"):
+        write_report(reproduction, folder)
+    assert (folder / "report.html").read_bytes() == before
+
+
+def test_overwriting_replaces_the_report_and_leaves_other_files(reproduction, tmp_path, quick):
+    folder = tmp_path / "report"
+    write_report(reproduction, folder)
+    (folder / "notes.txt").write_text("mine")
+    (folder / "data" / "more.csv").write_text("mine")
+    (folder / "report.html").write_text("old")
+    write_report(reproduction, folder, overwrite=True)
+    assert (folder / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert (
+        (folder / "notes.txt").read_text() == (folder / "data" / "more.csv").read_text() == "mine"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["report"]
+
+
+def test_an_empty_folder_is_filled(reproduction, tmp_path, quick):
+    (tmp_path / "report").mkdir()
+    assert write_report(reproduction, tmp_path / "report").is_file()
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_report_that_fails_leaves_nothing_half_written(
+    reproduction, tmp_path, monkeypatch, quick, there
+):
+    folder = tmp_path / "report"
+    if there:
+        write_report(reproduction, folder)
+        (folder / "report.html").write_text("old")
+
+    def fail(*_, **__):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(report_folder, "render_page", fail)
+    with pytest.raises(OutputError, match="disk full"):
+        write_report(reproduction, folder, overwrite=there)
+    assert [path.name for path in tmp_path.iterdir()] == (["report"] if there else [])
+    if there:
+        assert (folder / "report.html").read_text() == "old"
+
+
+def test_a_report_that_is_stopped_leaves_nothing(reproduction, tmp_path, monkeypatch, quick):
+    def stop(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(report_folder, "render_page", stop)
+    with pytest.raises(KeyboardInterrupt):
+        write_report(reproduction, tmp_path / "report")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_is_refused_before_the_work(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(OutputError, match="is a file"):
+        check_report_folder(file)
+    with pytest.raises(OutputError, match="cannot be made"):
+        check_report_folder(file / "report")
+    assert check_report_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
