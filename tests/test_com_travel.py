@@ -105,11 +105,11 @@ def test_it_is_negative_where_the_cop_is_off_its_sole(icub):
 
 
 def test_it_is_negative_where_the_contact_pulls(icub):
-    # With the CoM far beyond the left foot the right one pulls, its CoP over the middle of a wide
-    # sole: the distance to the edges is positive, the slack is not.
+    # With the CoM far beyond the left foot the right one pulls, and its CoP is in the middle of a
+    # wide sole: the distance to the edges is positive, the slack is not.
     far = copsense.lateral_sweep(icub, 0.0, 0.12, 5).stances[-1]
     wide = with_soles(far, copsense.rectangle((-2.0, 2.0), (-2.0, 2.0)))
-    found = copsense.cop_sensitivity(wide, WRENCH)
+    found = copsense.cop_sensitivity(wide, copsense.minimum_wrench(0.02))
     assert found.equilibrium.pulling == ("r_sole",)
     margin = copsense.edge_margin(wide.contacts[1].polygon, found.cop[1])
     assert margin.distance > 0

@@ -80,9 +80,14 @@ def test_both_sides_are_reported_where_one_stands(four_bar):
     found = copsense.cop_sensitivity(here, FAMILY, COP_ONLY)
     back, forth = (found.next_active_set_change(s * tangent) for s in (-1, 1))
     slopes = found.along(tangent)[:, 1]
+    load = found.equilibrium.wrenches[:, 2]
+    gains = found.wrench_derivative[:, 2] @ found.basis.T @ tangent
     for change, side in ((back, -1), (forth, 1)):
-        # Each foot's distance to the edge that its CoP is moving to, over how fast it goes there.
-        travels = (HALF - side * found.cop[:, 1]) / slopes
+        # Each foot's slack f_z (b - a p) at the edge that its CoP is moving to, over how fast it
+        # goes there: the four-bar's wrenches are affine in the CoM, so that this is exact.
+        left = HALF - side * found.cop[:, 1]
+        travels = load * left / (load * slopes - side * left * gains)
+        assert travels.min() == pytest.approx(EDGE - side * 0.02, rel=1e-9)
         assert change.binds
         assert change.travel == pytest.approx(travels.min(), rel=1e-9)
         assert change.name.startswith(four_bar.contact_names[int(np.argmin(travels))])

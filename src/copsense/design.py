@@ -29,8 +29,7 @@ NO_LIMIT = "none within the path"  # a score's first limit where the path ends b
 _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
 _AT_BOUND = 1e-2  # of a parameter's logarithm: the search's resolution
-_RESTARTS = 3  # of the simplex, as long as they gain something
-_GAINED = 1e-6  # of the objective: less is no gain
+_SIMPLEX = (0.5, 0.1)  # first steps of the searches, in steps of the grid
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
@@ -114,8 +113,7 @@ def design_criterion(
 ) -> Design:
     """Choose the parameters of a family that do best along a path.
 
-    A grid over the parameters, then a simplex search from its best point, begun again from where
-    it ends until that gains nothing.
+    A grid over the parameters, then a wide and a narrow simplex search from the best point.
 
     Args:
         path: postures to either side of its middle one, such as a lateral sweep.
@@ -215,9 +213,9 @@ def _search(
         return scores, None
     # Of equals, such as where the path ends before any limit, the one that strains least.
     where, best = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
-    step = (high - low) / (2 * (grid - 1))
-    for _ in range(_RESTARTS):
+    for size in _SIMPLEX:
         # Inwards from a bound: clipped to it, the simplex would be flat and never leave it.
+        step = size * (high - low) / (grid - 1)
         inwards = np.where(where + step <= high, step, -step)
         refined = scipy.optimize.minimize(
             lambda logs: cost(at(logs)),
@@ -232,11 +230,8 @@ def _search(
             },
         )
         found = at(refined.x)
-        gained = cost(best) - cost(found)
-        if found and gained > _ROUNDING:
+        if found and cost(found) < cost(best) - _ROUNDING:
             where, best = refined.x, found
-        if gained <= _GAINED:
-            break
     return scores, best
 
 

@@ -87,7 +87,7 @@ def sweep(
         ``reason`` is empty.
 
     Raises:
-        InvalidInputError: no criterion, or two of one name.
+        InvalidInputError: no criterion, two of one name, or a policy together with limits.
     """
     if isinstance(criteria, Criterion):
         raise InvalidInputError("criteria is a single criterion. Give a list of them.")
@@ -96,6 +96,12 @@ def sweep(
         raise InvalidInputError(
             f"a sweep needs criteria of distinct names, got {', '.join(names) or 'none'}. "
             "Give at least one; Criterion.named(...) renames one."
+        )
+    policies = [n for n, c in zip(names, criteria, strict=True) if not isinstance(c, Criterion)]
+    if policies and limits is not None and limits.any:
+        raise InvalidInputError(
+            f"limits apply to a Criterion; a policy q -> wrenches ({', '.join(policies)}) has to "
+            "respect them itself. Sweep it without limits, and look at its margins."
         )
     stance, shape = path.stances[0], (len(path), len(names))
     sizes = _sizes(stance)
