@@ -111,7 +111,7 @@ def test_it_is_negative_where_the_contact_pulls(icub):
     wide = with_soles(far, copsense.rectangle((-2.0, 2.0), (-2.0, 2.0)))
     found = copsense.cop_sensitivity(wide, copsense.minimum_wrench(0.02))
     assert found.equilibrium.pulling == ("r_sole",)
-    margin = copsense.edge_margin(wide.contacts[1].polygon, found.cop[1])
+    margin = wide.contacts[1].sole.margin(found.cop[1])
     assert margin.distance > 0
     assert found.com_travel[1] < 0 < found.com_travel[0]
 

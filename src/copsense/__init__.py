@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Any
 from copsense._version import __version__
 
 if TYPE_CHECKING:
+    from copsense.analysis import Analysis, analyse
     from copsense.contact import Contact, Plane, rectangle
     from copsense.cop import (
-        EdgeMargin,
         center_of_pressure,
         com_projection,
         contact_cops,
-        edge_margin,
         foot_rotation_indicator,
         total_center_of_pressure,
         zero_moment_point,
@@ -43,8 +42,9 @@ if TYPE_CHECKING:
     from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
     from copsense.margins import limit_margins
     from copsense.path import LateralPath, PosturePath, joint_sweep, lateral_sweep, path_through
+    from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
-    from copsense.regions import ComRegion, com_region, criterion_region
+    from copsense.regions import ComRegion, com_region, com_regions, criterion_region
     from copsense.robot import Robot
     from copsense.robots import (
         PRESETS,
@@ -77,6 +77,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CRITERIA",
     "PRESETS",
+    "Analysis",
     "Axis",
     "ComRegion",
     "ConstrainedEquilibrium",
@@ -91,6 +92,7 @@ __all__ = [
     "Limits",
     "PathScan",
     "Plane",
+    "Polygon",
     "Posture",
     "PostureCost",
     "PosturePath",
@@ -102,16 +104,17 @@ __all__ = [
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
+    "analyse",
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
     "com_region",
+    "com_regions",
     "contact_cops",
     "cop_sensitivity",
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "edge_margin",
     "failed_rows",
     "families",
     "finite_difference_sensitivity",
@@ -153,17 +156,16 @@ __all__ = [
 
 # Module -> the names that it gives to this one. Type checkers read the imports above.
 _HOMES = {
+    "copsense.analysis": ("Analysis", "analyse"),
     "copsense.contact": (
         "Contact",
         "Plane",
         "rectangle",
     ),
     "copsense.cop": (
-        "EdgeMargin",
         "center_of_pressure",
         "com_projection",
         "contact_cops",
-        "edge_margin",
         "foot_rotation_indicator",
         "total_center_of_pressure",
         "zero_moment_point",
@@ -204,6 +206,10 @@ _HOMES = {
         "lateral_sweep",
         "path_through",
     ),
+    "copsense.polygon": (
+        "EdgeMargin",
+        "Polygon",
+    ),
     "copsense.posture": (
         "Posture",
         "PostureCost",
@@ -213,6 +219,7 @@ _HOMES = {
     "copsense.regions": (
         "ComRegion",
         "com_region",
+        "com_regions",
         "criterion_region",
     ),
     "copsense.robot": ("Robot",),

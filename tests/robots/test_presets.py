@@ -29,7 +29,7 @@ def test_bipeds_face_x_with_the_left_foot_at_y(stance_of, name):
     assert left.translation[1] > 0.03 > -0.03 > right.translation[1]
     for place, contact in zip(stance.placements, stance.contacts, strict=True):
         assert place.rotation[0, 0] > 0.9
-        assert copsense.edge_margin(contact.polygon, (0.0, 0.0)).distance > 0.02
+        assert copsense.Polygon(contact.polygon).margin((0.0, 0.0)).distance > 0.02
 
 
 def test_four_bar_stands_as_the_papers_at_a_right_angle(stance_of):
@@ -87,3 +87,11 @@ def test_a_contact_that_the_user_placed_stays_there():
     lowered = copsense.load_stance("iCubGenova04", contacts=with_outline)
     assert lowered.contacts[0].offset[2] == pytest.approx(-0.0105, abs=1e-5)
     assert len(lowered.contacts[0].polygon) == 4
+
+
+@pytest.mark.parametrize("name", ["icub", "human", "four_bar"])
+def test_a_preset_and_load_stance_mean_the_same_by_posture_and_base_rpy(name):
+    preset = copsense.robots.PRESETS[name]
+    rpy = None if name == "four_bar" else preset.base_rpy
+    given = copsense.load_stance(name, posture=preset.posture, base_rpy=rpy)
+    np.testing.assert_array_equal(given.q, copsense.load_stance(name).q)

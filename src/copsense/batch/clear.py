@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch.result import BatchResult, array_names, nothing
-from copsense.contact import half_planes
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.sensitivity import cop_sensitivity
@@ -54,14 +53,10 @@ def fill_row(
 
 def sole_edges(stance: Stance) -> list[np.ndarray]:
     """Half-planes (a_x, a_y, b) of each contact's sole (e, 3); none where there is no sole."""
-    found = []
-    for contact in stance.contacts:
-        if contact.polygon is None or contact.kind == "point":
-            found.append(np.zeros((0, 3)))
-        else:
-            normals, offsets = half_planes(contact.polygon)
-            found.append(np.column_stack([normals, offsets]))
-    return found
+    return [
+        np.column_stack([c.sole.normals, c.sole.offsets]) if c.sole else np.zeros((0, 3))
+        for c in stance.contacts
+    ]
 
 
 def sole_margins(stance: Stance, cops: np.ndarray) -> np.ndarray:

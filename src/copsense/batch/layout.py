@@ -196,9 +196,8 @@ def _feet(stance: Stance, turns: list[np.ndarray], edges: list[np.ndarray]) -> F
     axes, plane = np.zeros((nc, 9)), np.zeros((nc, 6))
     point = np.array([c.kind == "point" for c in contacts], dtype=np.int64)
     for k, contact in enumerate(contacts):
-        frame = robot.frame(contact.frame)
-        body[k] = frame.parentJoint - 1
-        place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+        at = contact.on(robot)
+        body[k], place = at.joint - 1, at.placement
         placement[k, :9] = (turns[body[k]].T @ place.rotation).T.ravel()
         placement[k, 9:] = turns[body[k]].T @ place.translation
         if point[k]:

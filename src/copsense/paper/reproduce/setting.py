@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
@@ -25,7 +26,9 @@ def describe_parameters(
     """What was computed on: name -> sentence."""
     cost, half, postures = PostureCost(), feet_distance(stance) / 2, lateral.sizes["posture"]
     drop = float(np.mean([c.offset[2] for c in lowered.contacts])) * 1e3
-    deg = ", ".join(f"{j} {a:g}" for j, a in PRESETS[ROBOT].posture.items() if j[0] == "l")
+    deg = ", ".join(
+        f"{j} {math.degrees(a):g}" for j, a in PRESETS[ROBOT].posture.items() if j[0] == "l"
+    )
     return {
         "four-bar": f"l = {four_bar.leg_length:g} m, d = {four_bar.rod_length:g} m, "
         f"m_l = {four_bar.leg_mass:g} kg, m_b = {four_bar.body_mass:g} kg "
