@@ -138,8 +138,10 @@ def test_a_touched_limit_has_taken_its_side(four_bar):
     found = copsense.cop_sensitivity(at_edge, FAMILY, COP_ONLY)
     assert [limit.weak for limit in found.equilibrium.active] == [True]
     inward, outward = (found.next_active_set_change(s * tangent) for s in (-1, 1))
-    # Inwards the touched foot's CoP crosses its sole to the other edge; outwards it is held.
-    assert (inward.name, inward.binds) == ("r_sole: CoP at the -y (right) edge", True)
+    # Inwards the next is the other foot's, at the same distance beyond the middle (its slack is
+    # affine in the CoM, so that this is exact); outwards the touched one is held.
+    assert (inward.name, inward.binds) == ("l_sole: CoP at the -y (right) edge", True)
+    assert inward.travel == pytest.approx(2 * EDGE, rel=1e-9)
     assert outward.binds
     assert outward.name == "l_sole: CoP at the +y (left) edge"
     assert inward.travel > 1e-3
