@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from copsense._version import __version__
-from copsense.paper import FourBar
+from copsense.paper.closed_form import FourBar
 from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
 from copsense.posture import PostureCost
 from copsense.robots import PRESETS
