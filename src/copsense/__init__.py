@@ -70,9 +70,7 @@ if TYPE_CHECKING:
         solve_equilibrium,
         wrench_policy,
     )
-    from copsense.storage import load_results, write_results
-    from copsense.sweep_margins import with_limit_margins
-    from copsense.sweeps import failed_rows, sweep
+    from copsense.sweeps import Sweep, sweep
 
 __all__ = [
     "CRITERIA",
@@ -101,6 +99,7 @@ __all__ = [
     "Sole",
     "Stance",
     "StaticEquilibrium",
+    "Sweep",
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
@@ -115,7 +114,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "failed_rows",
     "families",
     "finite_difference_sensitivity",
     "foot_rotation_indicator",
@@ -126,7 +124,6 @@ __all__ = [
     "limit_margins",
     "limit_travel",
     "load_map",
-    "load_results",
     "load_robot",
     "load_stance",
     "map_postures",
@@ -148,9 +145,7 @@ __all__ = [
     "sweep",
     "total_center_of_pressure",
     "weighted_torque",
-    "with_limit_margins",
     "wrench_policy",
-    "write_results",
     "zero_moment_point",
 ]
 
@@ -254,13 +249,8 @@ _HOMES = {
         "solve_equilibrium",
         "wrench_policy",
     ),
-    "copsense.storage": (
-        "load_results",
-        "write_results",
-    ),
-    "copsense.sweep_margins": ("with_limit_margins",),
     "copsense.sweeps": (
-        "failed_rows",
+        "Sweep",
         "sweep",
     ),
 }

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.contact import Contact, Kind
@@ -14,6 +13,9 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits, rows_of
 from copsense.margins import UNITS, MarginTable
 from copsense.polygon import unpadded
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def with_limit_margins(dataset: xr.Dataset, limits: Limits) -> xr.Dataset:

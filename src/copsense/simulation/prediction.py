@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.controllers import STIFF, Gains
@@ -21,6 +20,7 @@ from copsense.margins import MarginTable, margin_table
 from copsense.scan import PathScan, ScanPoint
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
+from copsense.simulation.recording import Recording
 from copsense.stance import Stance
 
 # What keeps a contact in its place, but for friction, which is taken as a cone below.
@@ -109,10 +109,10 @@ class StaticPrediction:
         first = np.abs(self._first_torques(y)[:, at]).max()
         return float(np.interp(y, self.values, peaks).max()), float(first)
 
-    def attach(self, dataset: xr.Dataset) -> xr.Dataset:
+    def attach(self, recording: Recording) -> Recording:
         """A recording with this prediction beside it, over a dimension of its own."""
         what = {"units": "m", "long_name": "static centre of pressure along the path, contact axes"}
-        return dataset.assign(
+        dataset = recording.to_xarray().assign(
             static_cop=(("static", "contact", "axis"), self.cops, what),
             static_joint=(
                 ("static", "joint"),
@@ -124,7 +124,8 @@ class StaticPrediction:
                 self.values,
                 {"units": "m", "long_name": "where on the path, from its start"},
             ),
-        ).assign_attrs(
+        )
+        return Recording(dataset).with_attributes(
             static_excursion=self.excursion,
             static_contact=self.contact,
             static_how=self.how,

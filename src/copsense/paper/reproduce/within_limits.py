@@ -12,7 +12,6 @@ from copsense.path import LateralPath, PosturePath
 from copsense.regions import com_region, criterion_region
 from copsense.scan import PathScan
 from copsense.stance import Stance
-from copsense.sweep_margins import with_limit_margins
 from copsense.sweeps import sweep
 
 
@@ -22,7 +21,7 @@ def solve_within_limits(
     """The lateral sweep within limits, where they first bind, and the regions that they leave."""
     criteria = paper_criteria()
     with clock.stage("limits: sensitivities", len(path)) as advance:
-        dataset = with_limit_margins(sweep(path, criteria, limits, progress=advance), limits)
+        dataset = sweep(path, criteria, limits, progress=advance)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
         bindings, lateral = [], LateralPath(stance)
         for criterion in criteria:
