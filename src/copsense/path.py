@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,7 +25,7 @@ _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before th
 PostureSolver = Callable[[float, Stance], tuple[Stance, Float[np.ndarray, " nv"]]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PosturePath:
     """Stances along a curve on the constraint manifold, parametrised by a named coordinate.
 
@@ -53,6 +53,18 @@ class PosturePath:
         """Number of postures."""
         return len(self.stances)
 
+    def __iter__(self) -> Iterator[tuple[Stance, Float[np.ndarray, " nv"]]]:
+        """Each stance with the path's tangent there."""
+        return iter(zip(self.stances, self.tangents, strict=True))
+
+    def __repr__(self) -> str:
+        """Robot, coordinate, its range, and how many postures were not reached."""
+        failed = f", {len(self.failures)} not reached" if self.failures else ""
+        return (
+            f"PosturePath({self.stances[0].robot.name!r}, {len(self)} postures, {self.coordinate} "
+            f"from {self.values[0]:.4g} to {self.values[-1]:.4g} {self.unit}{failed})"
+        )
+
     @property
     def continuous(self) -> bool:
         """Whether `at` gives the postures in between."""
@@ -77,12 +89,8 @@ class PosturePath:
                 "joint_sweep."
             )
         known = [k for k in range(len(self)) if k not in self.failures]
-        near = (
-            self.stances[min(known, key=lambda k: abs(self.values[k] - value))]
-            if known
-            else (self.stances[i])
-        )
-        return self.solver(value, near)
+        nearest = min(known, key=lambda k: abs(self.values[k] - value), default=i)
+        return self.solver(value, self.stances[nearest])
 
     def shifted(self, by: float) -> PosturePath:
         """The same path with `by` added to its coordinate."""
