@@ -66,7 +66,7 @@ def test_it_is_exact_where_the_wrenches_are_affine_in_the_com(icub, length):
 
 def test_along_the_path_the_prediction_is_exact_for_the_minimum_wrench(icub):
     for side in (1, -1):
-        first = copsense.limit_travel(icub, WRENCH, COP_ONLY, side).first
+        first = copsense.scan.limit_travel(icub, WRENCH, COP_ONLY, side).first
         assert first.first_order == pytest.approx(first.exact, abs=1e-9)
 
 
@@ -83,7 +83,7 @@ def test_it_grows_with_the_width_of_the_stance(icub):
     for width in (0.14, 0.17, 0.20):
         stance = at_width(icub, width)
         shortest.append(copsense.cop_sensitivity(stance, TORQUE).com_travel.min())
-        first = copsense.limit_travel(stance, TORQUE, COP_ONLY).first
+        first = copsense.scan.limit_travel(stance, TORQUE, COP_ONLY).first
         predicted.append(first.first_order)
         exact.append(first.exact)
     assert exact == pytest.approx([0.0459, 0.0524, 0.0588], abs=1e-4)
@@ -131,6 +131,6 @@ def test_a_sole_that_is_a_line_tips_over_its_ends(stance_of):
     stance = stance.with_contacts([replace(c, polygon=ends) for c in stance.contacts])
     found = copsense.cop_sensitivity(stance, TORQUE)
     # Both weights alike: alpha = 1/2, and the closed form of the four-bar, affine in the CoM.
-    first = [copsense.limit_travel(stance, TORQUE, COP_ONLY, s).first.exact for s in (1, -1)]
+    first = [copsense.scan.limit_travel(stance, TORQUE, COP_ONLY, s).first.exact for s in (1, -1)]
     assert min(found.com_travel) == pytest.approx(min(first), abs=1e-9)
     assert sorted(found.tipping_edge) == [0, 1]

@@ -72,7 +72,7 @@ def test_postures_are_shared_between_criteria_sides_and_questions(icub, monkeypa
 
     monkeypatch.setattr(copsense.path, "solve_posture", counting)
     path = LateralPath(icub)
-    alone = copsense.limit_travel(icub, TORQUE, COP_ONLY)
+    alone = copsense.scan.limit_travel(icub, TORQUE, COP_ONLY)
     own = len(solved)
     for criterion in (WRENCH, TORQUE):
         PathScan(path, criterion).travel(COP_ONLY)
@@ -105,7 +105,7 @@ def test_a_search_stops_at_the_first_crossing(icub, counted):
     assert table.where[exact.row] == "r_sole"
     assert table.names[exact.row].endswith("+y (left)")
     assert exact.travel == pytest.approx(
-        copsense.limit_travel(path.stances[12], WRENCH, COP_ONLY).first.exact, abs=1e-5
+        copsense.scan.limit_travel(path.stances[12], WRENCH, COP_ONLY).first.exact, abs=1e-5
     )
     assert found.travel == pytest.approx(exact.travel, abs=1e-8)
     assert scan.first(slack, reach=0.03) is None

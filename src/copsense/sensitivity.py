@@ -109,7 +109,7 @@ class CopSensitivity:
     def next_active_set_change(self, tangent: ArrayLike) -> ActiveSetChange | None:
         """The next limit to bind or to let go along a path, to first order.
 
-        `copsense.next_active_set_change` finds the exact one on the lateral path.
+        `copsense.scan.next_active_set_change` finds the exact one on the lateral path.
 
         Args:
             tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6. Its negative looks

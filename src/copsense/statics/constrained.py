@@ -72,7 +72,7 @@ class ActiveSetChange:
     """The next limit to begin or cease to press along a motion.
 
     A prediction to first order from one posture has the first five; what a search along a path
-    finds (`copsense.next_active_set_change`) has them all.
+    finds (`copsense.scan.next_active_set_change`) has them all.
 
     Attributes:
         criterion: the criterion's name.
