@@ -1,5 +1,6 @@
 """Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
 
+from copsense.simulation.balance_run import balance
 from copsense.simulation.closed_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
 from copsense.simulation.events import Event, Thresholds
@@ -32,5 +33,6 @@ __all__ = [
     "SimulatorStoppedError",
     "Snapshot",
     "Thresholds",
+    "balance",
     "rollout",
 ]
