@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
-    from copsense.recorded import with_limit_margins
     from copsense.regions import ComRegion, com_region, com_regions, criterion_region
     from copsense.robot import Robot
     from copsense.robots import (
@@ -71,8 +70,7 @@ if TYPE_CHECKING:
         solve_equilibrium,
         wrench_policy,
     )
-    from copsense.storage import load_results, write_results
-    from copsense.sweeps import failed_rows, sweep
+    from copsense.sweeps import Sweep, sweep
 
 __all__ = [
     "CRITERIA",
@@ -100,6 +98,7 @@ __all__ = [
     "Sole",
     "Stance",
     "StaticEquilibrium",
+    "Sweep",
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
@@ -114,7 +113,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "failed_rows",
     "families",
     "finite_difference_sensitivity",
     "foot_rotation_indicator",
@@ -125,7 +123,6 @@ __all__ = [
     "limit_margins",
     "limit_travel",
     "load_map",
-    "load_results",
     "load_robot",
     "load_stance",
     "map_postures",
@@ -147,9 +144,7 @@ __all__ = [
     "sweep",
     "total_center_of_pressure",
     "weighted_torque",
-    "with_limit_margins",
     "wrench_policy",
-    "write_results",
     "zero_moment_point",
 ]
 
@@ -221,7 +216,6 @@ _HOMES = {
         "retract",
         "solve_posture",
     ),
-    "copsense.recorded": ("with_limit_margins",),
     "copsense.regions": (
         "ComRegion",
         "com_region",
@@ -255,12 +249,8 @@ _HOMES = {
         "solve_equilibrium",
         "wrench_policy",
     ),
-    "copsense.storage": (
-        "load_results",
-        "write_results",
-    ),
     "copsense.sweeps": (
-        "failed_rows",
+        "Sweep",
         "sweep",
     ),
 }

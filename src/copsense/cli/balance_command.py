@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,6 +25,9 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from copsense.simulation import Recording
 
 
 @click.command(
@@ -102,9 +105,9 @@ def balance(
     Ctrl-C ends the run and keeps what was recorded.
     """
     from copsense.controllers import lateral_reference
+    from copsense.files import check_output
     from copsense.simulation import MujocoSimulator, Scenario, rollout
     from copsense.simulation.prediction import predict
-    from copsense.storage import check_output, write_recording
 
     if len(criteria) > 1:
         raise InvalidInputError(
@@ -155,9 +158,9 @@ def balance(
         )
     if controller is None or criteria:  # of a user's own law the analysis knows nothing
         recording = predict(path, criterion, allowed).attach(recording)
-    recording.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
+    recording = recording.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
     if output is not None:
-        write_recording(recording, output, overwrite=force)
+        recording.save(output, overwrite=force)
     if picture is not None:
         from copsense.plots import plot_rollout, save_figure
 
@@ -194,39 +197,26 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _summary(recording: Any) -> dict[str, Any]:
+def _summary(recording: Recording) -> dict[str, Any]:
     """What a person wants to know of a run; tracking and torques are those before a tip."""
-    attributes = recording.attrs
-    tip_time = attributes["tip_time"]
-    standing = recording.sel(time=slice(None, tip_time if math.isfinite(tip_time) else None))
-    error = (standing["com"] - standing["com_target"]).sel(com_axis="y").values
-    loaded = standing["margin"].min("time")
-    torque = (standing["torque"] ** 2).sum("joint") ** 0.5
-    tip_y = float(recording["tip_com"].sel(com_axis="y"))
-    start = float(recording["com"].sel(com_axis="y")[0])
+    attributes, end, tip = recording.attrs, recording.end, recording.tip
+    torque = recording.before_first_tip["torque"]
     return {
         "robot": attributes["robot"],
         "controller": attributes["controller"],
-        "end": {
-            "kind": attributes["end_kind"],
-            "reason": attributes["end_reason"],
-            "time": attributes["end_time"],
-        },
-        "com_error_rms": float((error**2).mean() ** 0.5),
-        "com_error_peak": float(abs(error).max()),
-        "smallest_margin": {
-            str(name): float(value)
-            for name, value in zip(loaded["contact"].values, loaded.values, strict=True)
-        },
-        "torque_norm_mean": float(torque.mean()),
-        "torque_peak": float(abs(standing["torque"]).max()),
+        "end": {"kind": end.kind, "reason": end.message, "time": end.time},
+        "com_error_rms": recording.tracking_error,
+        "com_error_peak": recording.tracking_peak,
+        "smallest_margin": recording.smallest_margin,
+        "torque_norm_mean": float(((torque**2).sum("joint") ** 0.5).mean()),
+        "torque_peak": float(abs(torque).max()),
         "first_tip": None
-        if not attributes["tip_kind"]
+        if tip is None
         else {
-            "contact": attributes["tip_contact"],
-            "reason": attributes["tip_reason"],
-            "time": attributes["tip_time"],
-            "com_y_from_start": tip_y - start,
+            "contact": tip.contact,
+            "reason": tip.message,
+            "time": tip.time,
+            "com_y_from_start": recording.tip_travel,
         },
         "static_prediction": {
             "excursion": attributes.get("static_excursion", math.nan),

@@ -25,6 +25,7 @@ from jaxtyping import Float
 
 from copsense._version import __version__
 from copsense.errors import CopsenseError, MissingExtraError, OutputError
+from copsense.files import check_output
 from copsense.maps.columns import (
     EVALUATED,
     PENDING,
@@ -38,7 +39,6 @@ from copsense.maps.columns import (
 from copsense.maps.evaluation import Chunk
 from copsense.maps.plan import MapPlan, differences, digest, worded
 from copsense.maps.reduction import QUANTITIES, WORST, Part
-from copsense.storage import check_output
 
 _PARAMETERS = "copsense_map"  # the attribute by which a store is known
 _SUFFIX = ".zarr"
