@@ -31,17 +31,13 @@ assert abs(found.com_y - 0.0459) < 1e-4
 # %%
 # The regions, from above.
 
-regions = {
-    "friction and soles": copsense.com_region(stance, copsense.Limits(10.0, 1 / 3, torsion=1 / 75)),
-    "and torque limits": copsense.com_region(stance, limits),
-    "minimum-wrench": copsense.criterion_region(stance, copsense.minimum_wrench(1.0), limits),
-    "minimum-torque": copsense.criterion_region(stance, copsense.minimum_torque(), limits),
-}
+criteria = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
+regions = copsense.com_regions(stance, criteria, limits)
 path = copsense.lateral_sweep(stance, -0.05, 0.05, 21)
-data = copsense.sweep(path, [copsense.minimum_wrench(1.0), copsense.minimum_torque()])
+data = copsense.sweep(path, criteria)
 figure = plot_regions(regions, data).figure
-for name, region in regions.items():
-    print(f"{name}: {region.area * 1e4:.0f} cm2")
+for name, area in regions.areas.items():
+    print(f"{name}: {area * 1e4:.0f} cm2")
 assert regions["minimum-torque"].area < regions["and torque limits"].area
 
 # %%

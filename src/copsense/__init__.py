@@ -62,6 +62,7 @@ if TYPE_CHECKING:
         cop_sensitivity,
         finite_difference_sensitivity,
     )
+    from copsense.simulation import Recording, balance
     from copsense.sole import Sole, read_sole
     from copsense.stance import Stance
     from copsense.statics import (
@@ -93,6 +94,7 @@ __all__ = [
     "Posture",
     "PostureCost",
     "PosturePath",
+    "Recording",
     "Robot",
     "Sample",
     "Sole",
@@ -103,6 +105,7 @@ __all__ = [
     "WrenchTerm",
     "__version__",
     "analyse",
+    "balance",
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
@@ -238,6 +241,7 @@ _HOMES = {
         "cop_sensitivity",
         "finite_difference_sensitivity",
     ),
+    "copsense.simulation": ("Recording", "balance"),
     "copsense.sole": (
         "Sole",
         "read_sole",

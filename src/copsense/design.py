@@ -285,8 +285,7 @@ def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
         return groups
     depth: dict[str, list[str]] = {}
     for contact in stance.contacts:
-        chain = stance.robot.model.supports[stance.robot.frame(contact.frame).parentJoint]
-        for place, joint in enumerate(i for i in chain if i > 1):
+        for place, joint in enumerate(stance.limb(contact)):
             names = depth.setdefault(f"joint{place + 1}", [])
             name = stance.robot.model.names[joint]
             if name not in names:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +19,7 @@ from copsense.stance import Stance
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PosturePath:
     """Stances along a curve on the constraint manifold, parametrised by a named coordinate.
 
@@ -43,6 +43,18 @@ class PosturePath:
     def __len__(self) -> int:
         """Number of postures."""
         return len(self.stances)
+
+    def __iter__(self) -> Iterator[tuple[Stance, Float[np.ndarray, " nv"]]]:
+        """Each stance with the path's tangent there."""
+        return iter(zip(self.stances, self.tangents, strict=True))
+
+    def __repr__(self) -> str:
+        """Robot, coordinate, its range, and how many postures were not reached."""
+        failed = f", {len(self.failures)} not reached" if self.failures else ""
+        return (
+            f"PosturePath({self.stances[0].robot.name!r}, {len(self)} postures, {self.coordinate} "
+            f"from {self.values[0]:.4g} to {self.values[-1]:.4g} {self.unit}{failed})"
+        )
 
     def joint_rates(self, joint: str) -> Float[np.ndarray, " N"]:
         """d joint / d coordinate at each posture (N,)."""

@@ -31,7 +31,7 @@ from copsense.path import lateral_sweep
 from copsense.sensitivity import cop_sensitivity
 from copsense.simulation.prediction import force_gaps, predict
 
-LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
+LIMITS = Limits(normal_force=10.0, friction=1.0, cop_margin=1e-3, torsion=None)
 WITHIN = dataclasses.replace(C2, limits=LIMITS, name="")
 
 

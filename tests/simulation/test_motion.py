@@ -71,7 +71,7 @@ def test_a_slow_sine_is_tracked():
 def test_limits_carry_the_com_past_the_tip():
     from copsense.limits import Limits
 
-    limits = Limits(10.0, 1.0, 8, 1e-3, None, None)
+    limits = Limits(normal_force=10.0, friction=1.0, cop_margin=1e-3, torsion=None)
     controller = BalancingController(icub(), C1, limits=limits)
     signal = Ramp(0.04, 0.02)
     recording = rollout(simulator(), controller, Scenario(signal.duration + 0.3, signal))
@@ -85,7 +85,7 @@ def test_limits_that_do_not_bind_change_nothing():
 
     pair = [
         rollout(simulator(), BalancingController(icub(), C2, limits=limits), Scenario(0.1))
-        for limits in (None, Limits(1.0, 1.0, 8, 0.0, None, "model"))
+        for limits in (None, Limits(normal_force=1.0, friction=1.0, torsion=None, torque="model"))
     ]
     assert pair[0].equals(pair[1])
 

@@ -8,12 +8,15 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.controller_options import controller_options, read_controller
+from copsense.cli.controller_options import (
+    controller_options,
+    read_gains,
+    read_own_controller,
+)
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.disturbance_options import (
     REFERENCES,
@@ -104,10 +107,10 @@ def balance(
     static prediction, and whether the robot fell. Exit code 1 where it did not go to the end.
     Ctrl-C ends the run and keeps what was recorded.
     """
-    from copsense.controllers import lateral_reference
     from copsense.files import check_output
-    from copsense.simulation import MujocoSimulator, Scenario, rollout
-    from copsense.simulation.prediction import predict
+    from copsense.simulation import Scenario
+    from copsense.simulation import balance as run
+    from copsense.simulation.balance_run import natural_duration
 
     if len(criteria) > 1:
         raise InvalidInputError(
@@ -123,15 +126,10 @@ def balance(
 
         check_output(video, suffixes=(".mp4",), overwrite=force)
         check_video()
-    if controller is not None and limits is not None and not criteria:
-        raise InvalidInputError(
-            "--limits are those of the built-in controller and of the static prediction. Leave "
-            "them out, or name the --criterion that your controller is to be predicted by."
-        )
     (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
-    course, natural = read_signal(reference)
+    course = read_signal(reference)
     scenario = Scenario(
-        natural if duration is None else duration,
+        natural_duration(course) if duration is None else duration,
         course,
         control_period=control_period,
         name=reference,
@@ -139,25 +137,22 @@ def balance(
     )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
     scenario.check_stance(stance)
-    simulator = MujocoSimulator(stance, wrenches=wrenches)
-    scenario.steps_per_control(simulator.time_step)
-    law = read_controller(stance, controller, criterion, gains, gain, allowed)
-    path = lateral_reference(stance, course)
+    own = None if controller is None else read_own_controller(controller, gain, stance)
     total = round(scenario.duration / scenario.control_period)
-    with (
-        progress_bar(total, "balancing", "step") as update,
-        _interrupts() as stop,
-    ):
-        recording = rollout(
-            simulator,
-            law,
-            replace(scenario, reference=path),
+    with progress_bar(total, "balancing", "step") as update, _interrupts() as stop:
+        recording = run(
+            stance,
+            # Of a user's own controller the analysis knows what the user says.
+            criterion if own is None or criteria else None,
+            scenario,
+            limits=allowed,
+            gains=read_gains(gains, gain, stance.robot),
+            controller=own,
             until=until,
+            wrenches=wrenches,
             progress=update,
             stop=stop,
         )
-    if controller is None or criteria:  # of a user's own law the analysis knows nothing
-        recording = predict(path, criterion, allowed).attach(recording)
     recording = recording.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
     if output is not None:
         recording.save(output, overwrite=force)

@@ -135,8 +135,7 @@ class CaseRunner:
         model, names = self.stance.robot.model, set(self.stance.robot.torque_names)
         found: dict[str, None] = {}
         for contact in self.stance.contacts:
-            joint = model.frames[model.getFrameId(contact.frame)].parentJoint
-            for i in model.supports[joint]:
+            for i in self.stance.limb(contact):
                 if model.names[i] in names:
                     found[model.names[i]] = None
         return tuple(found)

@@ -7,8 +7,9 @@ Three nested convex sets of horizontal CoM positions c:
 * the criterion's own wrenches stay within all of them, with no QP to clip them:
   `criterion_region`.
 
-All three hold the contacts' Jacobian J and the gravity torques G_j of the joints at the stance's
-posture, as [Bretl2008] and [Orsolino2020] do, and move the weight's line of action alone:
+`com_regions` gives them all. They hold the contacts' Jacobian J and the gravity torques G_j of the
+joints at the stance's posture, as [Bretl2008] and [Orsolino2020] do, and move the weight's line of
+action alone:
 
     J_b' f = G_b(c) = G_b + S (c - c0),    S (c - c0) the moment of the weight moved by c - c0,
     A f <= b,    -t <= tau <= t,    tau = G_j - J_j' f.
@@ -27,7 +28,7 @@ Extension of the Support Region", IEEE Transactions on Robotics 36(4), 2020.
 from __future__ import annotations
 
 from copsense.regions.feasible_region import FINEST, com_region
-from copsense.regions.nested_regions import com_regions
+from copsense.regions.nested_regions import ComRegions, com_regions
 from copsense.regions.region import BOX, ComRegion
 from copsense.regions.unclipped_region import criterion_region
 from copsense.regions.weight_line import gravity_at
@@ -36,6 +37,7 @@ __all__ = [
     "BOX",
     "FINEST",
     "ComRegion",
+    "ComRegions",
     "com_region",
     "com_regions",
     "criterion_region",

@@ -1,5 +1,6 @@
 """Robots in closed loop: simulators, scenarios, and the recording of a controller's run."""
 
+from copsense.simulation.balance_run import balance
 from copsense.simulation.control_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
 from copsense.simulation.events import Event, Thresholds
@@ -32,5 +33,6 @@ __all__ = [
     "SimulatorStoppedError",
     "Snapshot",
     "Thresholds",
+    "balance",
     "rollout",
 ]
