@@ -21,7 +21,7 @@ from copsense.controllers import (
 from copsense.criterion import Criterion, minimum_torque
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
-from copsense.simulation.closed_loop import rollout
+from copsense.simulation.control_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
