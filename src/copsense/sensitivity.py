@@ -27,10 +27,8 @@ from copsense.statics import (
 )
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
-_MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _STILL = 1e-12  # gains under which nothing moves
 _ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
-_LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,28 +143,13 @@ class CopSensitivity:
         t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
         return self.along(t, float(t[index]))
 
-    @cached_property
+    @property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
         """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
 
-        v = Z S J_c' (J_c S J_c')^-1 = Z R (J_c R)^+ with S = (Z' M Z)^-1 = R R' and
-        J_c = J_com,xy Z. Where the contacts forbid a horizontal direction (the planar four-bar),
-        its part is zero.
+        See `Stance.com_motions`.
         """
-        Jc = self.equilibrium.stance.com_jacobian[:2] @ self.basis
-        R = self._inverse_root
-        return np.asarray(self.basis @ R @ np.linalg.pinv(Jc @ R, rcond=_LOST))
-
-    @cached_property
-    def _inverse_root(self) -> Float[np.ndarray, "p r"]:
-        """R with R R' = (Z' M Z)^-1, leaving out motions of massless links alone.
-
-        They have no energy to be measured by, and move no centre of mass.
-        """
-        energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
-        values, vectors = np.linalg.eigh(energy)
-        kept = values > _MASSLESS * values.max(initial=0.0)
-        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+        return self.equilibrium.stance.com_motions
 
     @cached_property
     def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
@@ -204,9 +187,9 @@ class CopSensitivity:
         whole mass would move.
         """
         # The largest singular value, 0 where the contacts leave nothing to move.
+        motions = self.equilibrium.stance.energy_motions
         speeds = [
-            np.linalg.svd(eta @ self._inverse_root, compute_uv=False).max(initial=0.0)
-            for eta in self.matrix
+            np.linalg.svd(eta @ motions, compute_uv=False).max(initial=0.0) for eta in self.gradient
         ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
