@@ -18,8 +18,8 @@ limits = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torq
 # knows it. And where it binds, the other foot has to pay: its slope jumps.
 
 for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
-    travel = copsense.limit_travel(stance, criterion, limits)
-    found = copsense.next_change(stance, criterion, limits)
+    travel = copsense.margins.limit_travel(stance, criterion, limits)
+    found = copsense.binding.next_change(stance, criterion, limits)
     print(
         f"{criterion.name}: {travel.first.name} after {travel.first.exact * 1e3:.1f} mm "
         f"(first order {travel.first.first_order * 1e3:.1f}); "
@@ -43,7 +43,7 @@ assert regions["minimum-torque"].area < regions["and torque limits"].area
 # %%
 # A criterion for this robot and these limits: torque weights that let the CoM go farther.
 
-family = copsense.families(stance)["length"]
+family = copsense.design.families(stance)["length"]
 sides = copsense.lateral_sweep(stance, -0.08, 0.08, 17)
 designed = copsense.design_criterion(sides, limits, family, grid=5)
 print(f"L = {designed.score.parameters['characteristic_length']:.3f} m")

@@ -214,7 +214,7 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
     named = 0
     for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
         for side in (1, -1):
-            for found in copsense.limit_travel(stance, criterion, limits, side).limits:
+            for found in copsense.margins.limit_travel(stance, criterion, limits, side).limits:
                 if not found.exact:
                     continue
                 y = float(stance.com[1]) + side * found.exact
@@ -233,6 +233,6 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
     [({"reach": np.nan}, "reach"), ({"reach": 0.0}, "reach"), ({"samples": 0}, "1 sample or more")],
 )
 def test_a_search_of_nothing_is_refused(icub, options, says):
-    for search in (limit_travel, copsense.next_change):
+    for search in (limit_travel, copsense.binding.next_change):
         with pytest.raises(InvalidInputError, match=says):
             search(icub, copsense.minimum_torque(), Limits(), **options)

@@ -36,7 +36,7 @@ def pressing(stance, criterion, limits):
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_four_bars_first_limit_binds_where_the_closed_form_says(four_bar, side):
-    found = copsense.next_change(four_bar, FAMILY, COP_ONLY, side)
+    found = copsense.binding.next_change(four_bar, FAMILY, COP_ONLY, side)
     assert found.binds
     assert found.limit == (
         "r_sole: CoP at the +y (left) edge" if side > 0 else "l_sole: CoP at the -y (right) edge"
@@ -51,7 +51,7 @@ def test_four_bars_first_limit_binds_where_the_closed_form_says(four_bar, side):
 @pytest.mark.parametrize("side", [-1, 1])
 def test_on_the_way_back_it_lets_go_at_the_same_place(four_bar, side):
     beyond, _ = lateral(four_bar, side * 1.2 * EDGE, four_bar.q)
-    found = copsense.next_change(beyond, FAMILY, COP_ONLY, -side)
+    found = copsense.binding.next_change(beyond, FAMILY, COP_ONLY, -side)
     assert not found.binds
     assert found.com_y == pytest.approx(side * EDGE, abs=1e-10)
     assert found.travel == pytest.approx(0.2 * EDGE, abs=1e-10)
@@ -67,7 +67,7 @@ def test_the_prediction_errs_as_the_square_of_the_distance(four_bar, start):
     for part in (1.0, 0.1):
         y = EDGE * (1 + (start - 1) * part)
         here, _ = lateral(four_bar, y, four_bar.q)
-        found = copsense.next_change(here, FAMILY, COP_ONLY, 1 if y < EDGE else -1)
+        found = copsense.binding.next_change(here, FAMILY, COP_ONLY, 1 if y < EDGE else -1)
         assert found.com_y == pytest.approx(EDGE, abs=1e-10)
         relative.append(abs(found.first_order - found.travel) / found.travel)
     # Of the four-bar's multiplier the prediction is exact: it is linear in the CoM.
@@ -99,7 +99,7 @@ def test_both_sides_are_reported_where_one_stands(four_bar):
 def test_icubs_pressing_limits_change_there_and_not_before(icub, criterion, start, side):
     here, _ = lateral_posture(icub, side * start + float(icub.com[1]))
     for direction in (-1, 1):
-        found = copsense.next_change(here, criterion, LIMITS, direction)
+        found = copsense.binding.next_change(here, criterion, LIMITS, direction)
         begin = copsense.solve_equilibrium(here, criterion, LIMITS)
         changed = {found.limit}
         held = {limit.name for limit in begin.active if not limit.weak}
@@ -121,7 +121,7 @@ def test_icubs_pressing_limits_change_there_and_not_before(icub, criterion, star
 def test_icubs_first_order_prediction_is_near(icub):
     here, tangent = lateral_posture(icub, 0.041)
     for direction in (-1, 1):
-        found = copsense.next_change(here, CRITERIA[0], LIMITS, direction)
+        found = copsense.binding.next_change(here, CRITERIA[0], LIMITS, direction)
         assert found.first_order == pytest.approx(found.travel, rel=0.02)
         sides = copsense.cop_sensitivity(here, CRITERIA[0], LIMITS).active_set_changes(tangent)
         assert sides[0 if direction < 0 else 1].travel == pytest.approx(found.first_order)
@@ -141,7 +141,7 @@ def test_a_touched_limit_has_taken_its_side(four_bar):
 
 
 def test_nothing_changes_within_reach(four_bar):
-    assert copsense.next_change(four_bar, FAMILY, COP_ONLY, 1, reach=0.5 * EDGE) is None
+    assert copsense.binding.next_change(four_bar, FAMILY, COP_ONLY, 1, reach=0.5 * EDGE) is None
 
 
 def test_without_limits_nothing_changes(icub):
@@ -152,13 +152,13 @@ def test_without_limits_nothing_changes(icub):
 
 def test_bad_questions_are_refused(icub):
     with pytest.raises(InvalidInputError, match=r"\+1 or -1"):
-        copsense.next_change(icub, CRITERIA[0], LIMITS, 0)
+        copsense.binding.next_change(icub, CRITERIA[0], LIMITS, 0)
     with pytest.raises(InvalidInputError, match="no limit is switched on"):
-        copsense.next_change(icub, CRITERIA[0], NO_LIMITS)
+        copsense.binding.next_change(icub, CRITERIA[0], NO_LIMITS)
     with pytest.raises(InvalidInputError, match="reach"):
-        copsense.next_change(icub, CRITERIA[0], LIMITS, reach=-1.0)
+        copsense.binding.next_change(icub, CRITERIA[0], LIMITS, reach=-1.0)
     with pytest.raises(InfeasibleError):
-        copsense.next_change(icub, CRITERIA[0], replace(LIMITS, normal_force=1e4))
+        copsense.binding.next_change(icub, CRITERIA[0], replace(LIMITS, normal_force=1e4))
     found = copsense.cop_sensitivity(icub, CRITERIA[0], LIMITS)
     still = np.zeros(icub.robot.model.nv)
     with pytest.raises(InvalidInputError, match="stays over one point"):
@@ -172,5 +172,7 @@ def test_bad_questions_are_refused(icub):
 def test_where_the_limits_leave_no_way_on_the_change_is_told_all_the_same(stance_of, robot, y):
     here, _ = lateral_posture(stance_of(robot), y)
     limits = copsense.Limits(friction=1 / 3)
-    found = [copsense.next_change(here, c, limits, side) for c in CRITERIA for side in (-1, 1)]
+    found = [
+        copsense.binding.next_change(here, c, limits, side) for c in CRITERIA for side in (-1, 1)
+    ]
     assert any(change is not None for change in found)

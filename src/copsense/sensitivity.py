@@ -111,7 +111,7 @@ class CopSensitivity:
     ) -> tuple[ActiveSetChange | None, ActiveSetChange | None]:
         """The next limit to bind or to let go, back and forth along a path, to first order.
 
-        `copsense.next_change` finds the exact one on the lateral path.
+        `copsense.binding.next_change` finds the exact one on the lateral path.
 
         Args:
             tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6.

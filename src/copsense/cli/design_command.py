@@ -9,8 +9,8 @@ import click
 
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
-from copsense.cli.quantities import read_range
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import read_range
 from copsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
