@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.arrays import array_property
+from copsense.arrays import array_property, owned, read_only
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
+from copsense.robot import Robot
 from copsense.stance import Stance
 
 _ROUNDING = 1e-9  # m
@@ -105,6 +106,8 @@ class LimitRows:
         kinds: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"`` or ``"wrench cone"``.
         torque: limit of the size of each joint's torque (n,) [Nm]; infinite where there is none.
         joints: name of each of these joints (n,).
+        normals: row of the stacked forces that a centre of pressure is under, its contact's normal
+            force; -1 for any other limit (r,).
     """
 
     matrix: Float[np.ndarray, "r m"]
@@ -114,6 +117,7 @@ class LimitRows:
     kinds: tuple[str, ...]
     torque: Float[np.ndarray, " n"]
     joints: tuple[str, ...]
+    normals: Int[np.ndarray, " r"]
 
     @array_property
     def joint(self) -> Int[np.ndarray, " k"]:
@@ -129,6 +133,16 @@ class LimitRows:
     def torque_names(self) -> tuple[str, ...]:
         """What each torque row limits (k,)."""
         return tuple(f"torque of {self.joints[i]}" for i in self.joint)
+
+    @cached_property
+    def all_names(self) -> tuple[str, ...]:
+        """What each row of `over_forces` limits (r + k,)."""
+        return self.names + self.torque_names
+
+    @cached_property
+    def all_kinds(self) -> tuple[str, ...]:
+        """The kind of each row of `over_forces` (r + k,)."""
+        return self.kinds + ("torque",) * len(self.joint)
 
     def over_forces(
         self, problem: LoadProblem
@@ -151,8 +165,30 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
             sole is too narrow for its margin.
         UnknownNameError: a torque limit names no joint.
     """
-    names = stance.robot.torque_names
-    return rows_of(stance.contacts, limits, torque_limits(stance, limits.torque), names)
+    torque = limits.torque
+    if isinstance(torque, Mapping):
+        given = tuple(sorted(torque.items()))
+        return _rows_on(stance.robot, tuple(stance.contacts), replace(limits, torque=None), given)
+    return _rows_on(stance.robot, tuple(stance.contacts), limits, None)
+
+
+@lru_cache(maxsize=128)  # a path's stances share theirs
+def _rows_on(
+    robot: Robot,
+    contacts: tuple[Contact, ...],
+    limits: Limits,
+    by_joint: tuple[tuple[str, float], ...] | None,
+) -> LimitRows:
+    """The rows on a robot's contacts, the same at every posture.
+
+    Args:
+        robot: the robot.
+        contacts: its contacts.
+        limits: the limits.
+        by_joint: torque limits by joint instead of the limits' own.
+    """
+    given = limits.torque if by_joint is None else dict(by_joint)
+    return rows_of(contacts, limits, _torque_limits(robot, given), robot.torque_names)
 
 
 def rows_of(
@@ -162,7 +198,7 @@ def rows_of(
     joints: tuple[str, ...],
 ) -> LimitRows:
     """The same of contacts and joints' torque limits (n,) alone, forces stacked in their order."""
-    matrix, bound, names, owners, kinds = [], [], [], [], []
+    matrix, bound, names, owners, kinds, normals = [], [], [], [], [], []
     m = sum(len(contact.components) for contact in contacts)
     start = 0
     for k, contact in enumerate(contacts):
@@ -175,24 +211,30 @@ def rows_of(
             names.append(f"{contact.name}: {name}")
             owners.append(k)
             kinds.append(kind)
+            normals.append(rows.start + contact.normal_row if kind == "cop" else -1)
     return LimitRows(
-        np.array(matrix).reshape(-1, m),
-        np.array(bound, dtype=float),
+        read_only(np.array(matrix).reshape(-1, m)),
+        read_only(np.array(bound, dtype=float)),
         tuple(names),
         tuple(owners),
         tuple(kinds),
-        torque,
+        owned(torque),
         joints,
+        read_only(np.array(normals, dtype=int)),
     )
 
 
 def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
     """Limit of the size of each joint's torque [Nm], infinite where there is none."""
-    names = stance.robot.torque_names
+    return _torque_limits(stance.robot, limits)
+
+
+def _torque_limits(robot: Robot, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
+    names = robot.torque_names
     if limits is None:
         return np.full(len(names), np.inf)
     if isinstance(limits, str):
-        return stance.robot.effort_limits
+        return robot.effort_limits
     if isinstance(limits, Mapping):
         for joint in limits:
             if joint not in names:

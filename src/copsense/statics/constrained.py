@@ -265,13 +265,8 @@ class _Problem:
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
         # Row of the normal force under a centre of pressure; -1 for any other limit.
-        under = [
-            stance.rows[k].start + stance.contacts[k].normal_row if kind == "cop" else -1
-            for k, kind in zip(rows.contacts, rows.kinds, strict=True)
-        ]
-        self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
-        self.names = rows.names + rows.torque_names
-        self.kinds = rows.kinds + ("torque",) * len(rows.joint)
+        self.normal = np.concatenate([rows.normals, np.full(len(rows.joint), -1)])
+        self.names, self.kinds = rows.all_names, rows.all_kinds
         E, e = load.base_map.T, load.base_wrench
         self.program = Program(self.H, self.g, E, e, self.A, self.b, self.weight)
         self.scale = self.program.scale
