@@ -18,15 +18,15 @@ limits = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torq
 # knows it. And where it binds, the other foot has to pay: its slope jumps.
 
 for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
-    travel = copsense.margins.limit_travel(stance, criterion, limits)
-    found = copsense.binding.next_change(stance, criterion, limits)
+    travel = copsense.scan.limit_travel(stance, criterion, limits)
+    found = copsense.scan.next_active_set_change(stance, criterion, limits)
     print(
         f"{criterion.name}: {travel.first.name} after {travel.first.exact * 1e3:.1f} mm "
         f"(first order {travel.first.first_order * 1e3:.1f}); "
         f"slopes {found.before[:, 1].round(2)} -> {found.after[:, 1].round(2)}"
     )
 
-assert abs(found.com_y - 0.0459) < 1e-4
+assert abs(found.value - 0.0459) < 1e-4
 
 # %%
 # The regions, from above.

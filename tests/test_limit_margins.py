@@ -111,7 +111,7 @@ def test_margins_within_limits_are_never_negative(stance_of):
         assert len(kinds) <= len(touched)
 
 
-def test_rates_are_the_derivatives_of_the_margins(stance_of):
+def test_rates_are_the_derivatives_of_the_slacks(stance_of):
     rng = np.random.default_rng(9)
     stance = random_stance(stance_of("icub"), rng)
     limits = replace(Limits(), torque=20.0, friction_sides=4)
@@ -119,12 +119,12 @@ def test_rates_are_the_derivatives_of_the_margins(stance_of):
 
     def values(at):
         found = copsense.solve_equilibrium(at, copsense.minimum_torque())
-        return found, table.values(found.forces, found.torques)
+        return found, table.slack(found.forces, found.torques)
 
-    equilibrium, here = values(stance)
+    equilibrium, _ = values(stance)
     direction = stance.admissible_motions @ rng.standard_normal(17) / 5
     df, dtau = (d[:, 0] for d in equilibrium.derivative(direction[:, None]))
-    rates = table.rates(equilibrium, here, df, dtau)
+    rates = table.slack_rates(df, dtau)
     at = {
         k: values(copsense.posture.retract(stance, 1e-3 * k * direction))[1] for k in (-2, -1, 1, 2)
     }

@@ -78,17 +78,19 @@ def test_a_sole_of_two_points_has_its_two_ends():
     assert outside.side == "-y (right)"
 
 
-def travel_by_search(polygon, cop, gain):
-    """Shortest straight CoM travel that brings a CoP cop + gain @ travel to the sole's edge."""
+def travel_by_search(polygon, cop, gain, share, load_gain):
+    """Shortest straight CoM travel that uses up an edge's slack share (b - a cop)."""
     angles = np.linspace(0, 2 * np.pi, 20001)
+    towards = np.array([np.cos(angles), np.sin(angles)])
     shortest = np.inf
     for i, a in enumerate(polygon):
         along = polygon[(i + 1) % len(polygon)] - a
         normal = np.array([along[1], -along[0]]) / np.hypot(*along)
-        speed = normal @ gain @ [np.cos(angles), np.sin(angles)]
-        forwards = speed > 1e-9
+        distance = normal @ (a - cop)
+        closing = share * (normal @ gain @ towards) - distance * (load_gain @ towards)
+        forwards = closing > 1e-9
         if forwards.any():
-            shortest = min(shortest, np.min(normal @ (a - cop) / speed[forwards]))
+            shortest = min(shortest, np.min(share * distance / closing[forwards]))
     return shortest
 
 
@@ -97,7 +99,10 @@ def test_com_travel_is_the_shortest_that_brings_the_cop_to_an_edge(lateral_path,
     stance = off_centre(lateral_path.stances[row])
     found = copsense.cop_sensitivity(stance, copsense.minimum_torque())
     for k, contact in enumerate(stance.contacts):
-        shortest = travel_by_search(contact.polygon, found.cop[k], found.com_gain[k])
+        share = found.equilibrium.wrenches[k, 2] / stance.robot.weight
+        shortest = travel_by_search(
+            contact.polygon, found.cop[k], found.com_gain[k], share, found.load_gain[k]
+        )
         assert found.com_travel[k] > 0
         assert found.com_travel[k] == pytest.approx(shortest, rel=1e-6)
 

@@ -187,3 +187,17 @@ def test_contacts_without_a_sole_have_no_edge(icub):
     assert swept["sole_polygon"].sel(contact="hand").isnull().all()
     assert swept["sole_polygon"].sel(contact="l_sole").notnull().all()
     assert swept.attrs["contact_kinds"] == "surface, surface, point"
+
+
+def test_a_policy_and_limits_are_rejected_before_anything_is_solved(icub):
+    path = copsense.lateral_sweep(icub, -0.01, 0.01, 3)
+
+    def policy(q):
+        return copsense.solve_equilibrium(icub.at(q), TORQUE).wrenches
+
+    seen = []
+    with pytest.raises(copsense.CopsenseError, match="is a policy"):
+        copsense.sweep(path, [policy], copsense.Limits(), progress=seen.append)
+    assert not seen
+    with pytest.raises(copsense.CopsenseError, match="limits apply to a Criterion"):
+        copsense.cop_sensitivity(icub, policy, copsense.Limits())

@@ -144,10 +144,10 @@ def test_a_ramp_arrives_without_a_jump():
 def test_the_prediction_says_both_orders():
     prediction = predict_lean(icub(), C1, -0.05)
     assert prediction.contact == "l_sole"
-    # Criterion 1 is affine in the CoM: its first order is nearly exact, criterion 2's is not.
-    assert prediction.first_order == pytest.approx(prediction.excursion, rel=3e-3)
+    # Criterion 1 is affine in the CoM: its first order is exact, criterion 2's is not.
+    assert prediction.first_order == pytest.approx(prediction.excursion, abs=1e-9)
     other = predict_lean(icub(), C2, 0.05)
-    assert other.first_order > 1.2 * other.excursion
+    assert 1.04 * other.excursion < other.first_order < 1.1 * other.excursion
     # A sine goes as far to either side, and to one of them first.
     for amplitude, contact in ((0.05, "r_sole"), (-0.05, "l_sole")):
         sine = predict(lateral_reference(icub(), Sine(amplitude, 0.1)), C1)

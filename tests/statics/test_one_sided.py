@@ -52,11 +52,11 @@ def compare(stance, y, criterion, limits, tolerance=1e-6):
     """CoP slopes before and after y, checked against one-sided differences."""
     here, tangent = lateral(stance, y, stance.q)
     found = copsense.cop_sensitivity(here, criterion, limits)
-    slopes = [side[:, 1] for side in found.one_sided(tangent)]
+    slopes = [found.one_sided(tangent, side=s)[:, 1] for s in (-1, 1)]
     for exact, numeric in zip(slopes, both_sides(stance, y, cop_y(criterion, limits)), strict=True):
         np.testing.assert_allclose(exact, numeric, rtol=tolerance, atol=tolerance)
     # Counting the coordinate the other way swaps and turns the sides.
-    turned = [side[:, 1] for side in found.one_sided(tangent, -1.0)]
+    turned = [found.one_sided(tangent, side=s, rate=-1.0)[:, 1] for s in (-1, 1)]
     np.testing.assert_allclose(turned, [-slopes[1], -slopes[0]], rtol=1e-12, atol=1e-12)
     return found.equilibrium, slopes
 

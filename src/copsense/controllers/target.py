@@ -7,7 +7,7 @@ A signal (`Hold`, `Sine`, `Ramp`) says how far along a path the robot should be 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -66,7 +66,7 @@ class Hold:
     value: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no number."""
+        """Reject what is not a number."""
         finite_number(self.value, "the value held")
 
     def at(self, time: float) -> tuple[float, float, float]:
@@ -77,6 +77,11 @@ class Hold:
     def extent(self) -> tuple[float, float]:
         """Least and greatest value."""
         return self.value, self.value
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return 0.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +97,7 @@ class Sine:
     frequency: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no motion."""
+        """Reject what is not a motion."""
         finite_number(self.amplitude, "the amplitude of a sine")
         finite_number(self.frequency, "the frequency of a sine [Hz]", positive=True)
 
@@ -106,6 +111,11 @@ class Sine:
     def extent(self) -> tuple[float, float]:
         """Least and greatest value."""
         return -abs(self.amplitude), abs(self.amplitude)
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return abs(self.amplitude) * (2 * math.pi * self.frequency) ** 2
 
 
 @dataclass(frozen=True)
@@ -123,7 +133,7 @@ class Ramp:
     rounding: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse a ramp without speed."""
+        """Reject a ramp without speed."""
         finite_number(self.distance, "the distance of a ramp [m]")
         finite_number(self.speed, "the speed of a ramp [m/s]", positive=True)
         finite_number(self.rounding, "the rounding of a ramp [s]", positive=True)
@@ -154,6 +164,11 @@ class Ramp:
     def extent(self) -> tuple[float, float]:
         """Least and greatest value."""
         return min(0.0, self.distance), max(0.0, self.distance)
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return self.speed / self.rounding if self.distance else 0.0
 
 
 class PathReference:
@@ -248,7 +263,7 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     low, high = min(low, -_SPACING), max(high, _SPACING)
     count = math.ceil((high - low) / _SPACING) + 1
     if count > 5 * _COARSE:
-        # A lean far out of reach is told by a few postures, not by hundreds.
+        # A few postures are enough to see that a lean is far out of reach.
         few = lateral_sweep(
             stance, start + low, start + high, count // _COARSE + 1, com_x=float(stance.com[0])
         )
@@ -256,4 +271,4 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
             if i in few.failures:
                 raise UnreachablePostureError(few.failures[i])
     path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
-    return PathReference(replace(path, values=path.values - start, coordinate="com_y"), signal)
+    return PathReference(path.shifted(-start), signal)

@@ -18,7 +18,7 @@ That is exact for a load that shifts on the base's link. It is exact for every p
 contacts where torques take no part: friction and soles alone, and the minimum wrench, know only
 the contacts and the CoM. Torques do depend on the posture, so a robot that leans by itself meets
 other limits than one whose load shifts: ``criterion_region(..., moving=True)`` is the first order
-of that, and `copsense.margins.limit_travel` follows the posture exactly.
+of that, and `copsense.scan.limit_travel` follows the posture exactly.
 
 [Bretl2008] T. Bretl, S. Lall, "Testing Static Equilibrium for Legged Robots", IEEE Transactions on
 Robotics 24(4), 2008. [Orsolino2020] R. Orsolino et al., "Feasible Region: An Actuation-Aware
