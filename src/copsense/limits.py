@@ -44,7 +44,7 @@ class Limits(ByContent):
             friction and centre-of-pressure limits too; None switches it off.
         torque: ``"model"`` for the model's effort limits, a number for every joint, or joint ->
             limit [Nm]; None switches it off. Placeholders of the model (see
-            `Robot.effort_limits`) are no limits: `torque_placeholders` names them.
+            `Robot.effort_limits`) do not count as limits: `torque_placeholders` names them.
     """
 
     normal_force: float | None = 0.0
