@@ -10,7 +10,8 @@ import numpy as np
 
 from copsense._version import __version__
 from copsense.paper.closed_form import FourBar
-from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
+from copsense.paper.closed_form.between_feet import PAPER_LENGTH
+from copsense.paper.reproduce.sideways import feet_distance
 from copsense.posture import PostureCost
 from copsense.robots import PRESETS
 from copsense.stance import Stance
