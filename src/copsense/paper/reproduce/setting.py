@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 import platform
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from copsense._version import __version__
 from copsense.paper.closed_form import FourBar
 from copsense.paper.closed_form.between_feet import PAPER_LENGTH
 from copsense.paper.reproduce.sideways import feet_distance
 from copsense.posture import PostureCost
+from copsense.provenance import versions
 from copsense.robots import PRESETS
 from copsense.stance import Stance
 from copsense.sweeps import Sweep
 
 ROBOT = "icub"
 _MODEL = "iCubGenova04"
+_PACKAGES = ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models")
 
 
 def describe_parameters(
@@ -57,14 +57,10 @@ def describe_parameters(
 
 def find_versions() -> dict[str, str]:
     """Of this package, Python and what it rests on."""
-    found = {
-        "copsense": __version__,
+    found = versions(_PACKAGES)
+    of_python = {
         "Python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
     }
-    for package in ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not a distribution"
-    return found
+    rest = {package: found[package] or "not a distribution" for package in _PACKAGES}
+    return {"copsense": found["copsense"]} | of_python | rest
