@@ -8,8 +8,7 @@ import platform
 import numpy as np
 
 from copsense.paper.closed_form import FourBar
-from copsense.paper.closed_form.between_feet import PAPER_LENGTH
-from copsense.paper.reproduce.sideways import feet_distance
+from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
 from copsense.posture import PostureCost
 from copsense.provenance import versions
 from copsense.robots import PRESETS
@@ -18,7 +17,6 @@ from copsense.sweeps import Sweep
 
 ROBOT = "icub"
 _MODEL = "iCubGenova04"
-_PACKAGES = ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models")
 
 
 def describe_parameters(
@@ -57,10 +55,11 @@ def describe_parameters(
 
 def find_versions() -> dict[str, str]:
     """Of this package, Python and what it rests on."""
-    found = versions(_PACKAGES)
-    of_python = {
+    packages = ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models")
+    found = {name: text or "not a distribution" for name, text in versions(packages).items()}
+    return {
+        "copsense": found.pop("copsense"),
         "Python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
+        **found,
     }
-    rest = {package: found[package] or "not a distribution" for package in _PACKAGES}
-    return {"copsense": found["copsense"]} | of_python | rest
