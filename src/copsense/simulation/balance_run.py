@@ -94,7 +94,10 @@ def balance(
         progress=progress,
         stop=stop,
     )
-    return recording if predicted is None else predict(path, predicted, limits).attach(recording)
+    if predicted is None:
+        return recording
+    friction = scenario.friction_at_start(stance, simulator.settings.friction)
+    return predict(path, predicted, limits, friction).attach(recording)
 
 
 def natural_duration(reference: Signal | PathReference) -> float:
