@@ -86,6 +86,8 @@ def balance(
     if controller is None:
         assert predicted is not None
         controller = BalancingController(stance, predicted, gains, limits=limits)
+    ground = scenario.friction_at_start(stance, simulator.settings.friction)
+    prediction = None if predicted is None else predict(path, predicted, limits, ground)
     recording = rollout(
         simulator,
         controller,
@@ -94,10 +96,7 @@ def balance(
         progress=progress,
         stop=stop,
     )
-    if predicted is None:
-        return recording
-    friction = scenario.friction_at_start(stance, simulator.settings.friction)
-    return predict(path, predicted, limits, friction).attach(recording)
+    return recording if prediction is None else prediction.attach(recording)
 
 
 def natural_duration(reference: Signal | PathReference) -> float:
