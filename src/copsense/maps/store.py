@@ -37,8 +37,9 @@ from copsense.maps.columns import (
     labels,
 )
 from copsense.maps.evaluation import Chunk
-from copsense.maps.plan import MapPlan, differences, digest, worded
+from copsense.maps.plan import MapPlan
 from copsense.maps.reduction import QUANTITIES, WORST, Part
+from copsense.provenance import differences, digest, worded
 
 _PARAMETERS = "copsense_map"  # the attribute by which a store is known
 _SUFFIX = ".zarr"
