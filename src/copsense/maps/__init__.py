@@ -4,6 +4,10 @@
 map that was stopped goes on where it was. `load_map` opens the store.
 """
 
+from copsense.extras import require
+
+require("xarray", "a map")  # before the modules that import it
+
 from copsense.maps.mapping import load_map, map_postures, map_summary
 from copsense.maps.marginal import Marginal, marginal
 from copsense.maps.plan import MapPlan
