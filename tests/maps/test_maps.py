@@ -10,7 +10,7 @@ import copsense
 from copsense.batch import PostureChart
 from copsense.errors import CopsenseError
 from copsense.maps import Axis, Grid, Sample
-from copsense.maps.reach import height_advice
+from copsense.maps.heights import height_advice
 
 
 def _grid_of(ranges):

@@ -60,7 +60,7 @@ def test_what_is_no_map_is_refused_and_kept(what, icub, both, sample, tmp_path):
         path.mkdir()
         (path / "zarr.json").write_text("{")
     before = _snapshot(tmp_path)
-    with pytest.raises(OutputError, match="is no map of copsense"):
+    with pytest.raises(OutputError, match="is not a map of copsense"):
         copsense.map_postures(icub, sample, both, path)
     assert _snapshot(tmp_path) == before
 
@@ -71,9 +71,9 @@ def test_a_store_that_a_future_version_made_says_so(whole, icub, both, sample, t
     path = tmp_path / "m.zarr"
     shutil.copytree(whole[0], path)
     group = zarr.open_group(path, mode="r+")
-    parameters = json.loads(group.attrs["copsense_map"]) | {"layout": 99}
+    parameters = json.loads(group.attrs["copsense_map"]) | {"format": 99}
     group.attrs["copsense_map"] = json.dumps(parameters)
-    with pytest.raises(OutputError, match="layout is 99 there, 1 here"):
+    with pytest.raises(OutputError, match="format is 99 there, 2 here"):
         copsense.map_postures(icub, sample, both, path, chunk=32)
 
 
