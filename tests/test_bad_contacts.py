@@ -127,7 +127,7 @@ def test_numbers_of_a_contact_must_be_finite(field, value):
 
 def test_a_rotation_must_be_one():
     for matrix in (np.ones((3, 3)), -np.eye(3), 2 * np.eye(3)):
-        with pytest.raises(InvalidInputError, match="no rotation matrix"):
+        with pytest.raises(InvalidInputError, match="not a rotation matrix"):
             Contact("foot", rotation=matrix)
 
 
@@ -137,7 +137,7 @@ def test_a_polygon_needs_two_points():
 
 
 def test_a_plane_needs_a_direction():
-    with pytest.raises(InvalidInputError, match=r"no direction. Give one"):
+    with pytest.raises(InvalidInputError, match=r"not a direction. Give one"):
         Plane(normal=(0, 0, 0))
     with pytest.raises(InvalidInputError, match="not finite"):
         Plane(normal=(0, 0, np.nan))

@@ -132,12 +132,16 @@ def test_an_audit_says_where_and_by_how_much_it_failed(icub):
 def test_a_margin_is_of_a_point_and_a_polygon_in_order(icub):
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     middle = np.array([0.5, 0.5])
-    assert copsense.edge_margin(square, middle).distance == pytest.approx(0.5)
-    for wrong in (square[::-1], square[:1], np.vstack([square, square[-1:]])):
+    assert copsense.Polygon(square).margin(middle).distance == pytest.approx(0.5)
+    star = np.array([[np.cos(2 * t), np.sin(2 * t)] for t in np.arange(5) * 2 * np.pi / 5])
+    dented = np.insert(square, 1, [0.5, 0.1], axis=0)
+    for wrong in (square[::-1], np.vstack([square, square[-1:]]), star, dented):
         with pytest.raises(InvalidInputError, match="counter-clockwise"):
-            copsense.edge_margin(wrong, middle)
+            copsense.Polygon(wrong)
+    with pytest.raises(InvalidInputError, match="no edge"):
+        copsense.Polygon(square[:1]).margin(middle)
     with pytest.raises(InvalidInputError, match="the point is not finite"):
-        copsense.edge_margin(square, np.array([np.nan, 0.5]))
+        copsense.Polygon(square).margin(np.array([np.nan, 0.5]))
 
 
 @pytest.mark.parametrize("thickness", [0.0, -1e-3, np.nan])

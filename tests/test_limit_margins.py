@@ -35,7 +35,7 @@ def test_every_margin_in_its_own_unit(case):
     for contact, w, cop in zip(stance.contacts, equilibrium.wrenches, cops, strict=True):
         fx, fy, fz, _, _, mz = w
         cop_margin = margins[contact.name, "cop"]
-        edge = copsense.edge_margin(contact.polygon, cop)
+        edge = copsense.Polygon(contact.polygon).margin(cop)
         assert cop_margin.unit == "m"
         assert cop_margin.value == pytest.approx(edge.distance - 0.005, abs=1e-12)
         assert edge.side in cop_margin.name

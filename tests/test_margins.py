@@ -37,13 +37,13 @@ def test_margin_is_the_distance_to_the_nearest_edge_and_positive_inside():
     for _ in range(30):
         polygon = random_polygon(rng)
         for point in rng.uniform(-0.15, 0.15, (40, 2)):
-            margin = copsense.edge_margin(polygon, point)
+            margin = copsense.Polygon(polygon).margin(point)
             distance, edge = nearest_line(polygon, point)
             assert margin.distance == pytest.approx(distance, abs=1e-15)
             assert margin.edge == edge
             assert (margin.distance > 0) == winds_around(polygon, point)
             if margin.distance > 0:  # going out by the margin along the normal meets the edge
-                on = copsense.edge_margin(polygon, point + margin.distance * margin.normal)
+                on = copsense.Polygon(polygon).margin(point + margin.distance * margin.normal)
                 assert on.distance == pytest.approx(0, abs=1e-15)
 
 
@@ -59,7 +59,7 @@ def test_margin_is_the_distance_to_the_nearest_edge_and_positive_inside():
     ],
 )
 def test_margin_names_the_side(point, distance, side, normal):
-    margin = copsense.edge_margin(SOLE, point)
+    margin = copsense.Polygon(SOLE).margin(point)
     assert margin.distance == pytest.approx(distance, abs=1e-15)
     assert margin.side == side
     np.testing.assert_allclose(margin.normal, normal, atol=1e-15)
@@ -69,7 +69,7 @@ def test_a_sole_of_two_points_has_its_two_ends():
     line = copsense.rectangle((0.0, 0.0), (-0.03, 0.05))
     line = copsense.Contact("any", polygon=line).polygon
     assert len(line) == 2
-    near, outside = (copsense.edge_margin(line, (0.0, y)) for y in (0.04, -0.05))
+    near, outside = (copsense.Polygon(line).margin((0.0, y)) for y in (0.04, -0.05))
     assert near.distance == pytest.approx(0.01)
     assert near.side == "+y (left)"
     assert outside.distance == pytest.approx(-0.02)
@@ -103,7 +103,7 @@ def test_com_travel_is_the_shortest_that_brings_the_cop_to_an_edge(lateral_path,
 def test_com_travel_is_negative_where_the_cop_is_off_the_sole(lateral_path):
     found = copsense.cop_sensitivity(lateral_path.stances[0], copsense.minimum_wrench(1.0))
     for k, contact in enumerate(found.equilibrium.stance.contacts):
-        assert copsense.edge_margin(contact.polygon, found.cop[k]).distance < 0
+        assert copsense.Polygon(contact.polygon).margin(found.cop[k]).distance < 0
         assert found.com_travel[k] < 0
 
 

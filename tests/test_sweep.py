@@ -104,7 +104,7 @@ def test_every_row_is_the_postures_own_result(swept, path):
             for name, value in expected.items():
                 np.testing.assert_array_equal(row[name].values, value, err_msg=name)
             for k, contact in enumerate(stance.contacts):
-                margin = copsense.edge_margin(contact.polygon, found.cop[k])
+                margin = copsense.Polygon(contact.polygon).margin(found.cop[k])
                 assert row["margin"].values[k] == margin.distance
                 assert row["margin_side"].values[k] == margin.side
     np.testing.assert_array_equal(swept["com_y"].values, path.values)

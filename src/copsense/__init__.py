@@ -16,11 +16,9 @@ if TYPE_CHECKING:
     from copsense.binding import LimitChange, next_change
     from copsense.contact import Contact, Plane, rectangle
     from copsense.cop import (
-        EdgeMargin,
         center_of_pressure,
         com_projection,
         contact_cops,
-        edge_margin,
         foot_rotation_indicator,
         total_center_of_pressure,
         zero_moment_point,
@@ -44,6 +42,7 @@ if TYPE_CHECKING:
     from copsense.maps import Axis, Grid, Sample, load_map, map_postures, map_summary
     from copsense.margins import limit_margins, limit_travel
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
+    from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
     from copsense.recorded import with_limit_margins
     from copsense.regions import ComRegion, com_region, criterion_region
@@ -90,6 +89,7 @@ __all__ = [
     "LimitChange",
     "Limits",
     "Plane",
+    "Polygon",
     "Posture",
     "PostureCost",
     "PosturePath",
@@ -110,7 +110,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "edge_margin",
     "failed_rows",
     "families",
     "finite_difference_sensitivity",
@@ -162,11 +161,9 @@ _HOMES = {
         "rectangle",
     ),
     "copsense.cop": (
-        "EdgeMargin",
         "center_of_pressure",
         "com_projection",
         "contact_cops",
-        "edge_margin",
         "foot_rotation_indicator",
         "total_center_of_pressure",
         "zero_moment_point",
@@ -208,6 +205,10 @@ _HOMES = {
         "joint_sweep",
         "lateral_sweep",
         "path_through",
+    ),
+    "copsense.polygon": (
+        "EdgeMargin",
+        "Polygon",
     ),
     "copsense.posture": (
         "Posture",

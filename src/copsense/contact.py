@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
-from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
 from copsense.errors import InvalidInputError
+from copsense.polygon import Polygon
+from copsense.rigid_body import Attachment
+from copsense.robot import Robot
 
 Kind = Literal["surface", "point", "planar"]
 
@@ -37,16 +41,28 @@ class Plane:
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        """Refuse a plane without direction; store the unit normal."""
+        """Validate the plane; store the unit normal."""
         point = finite_array(self.point, "the plane's point", (3,), "x, y, z in the world [m]")
         normal = finite_array(self.normal, "the plane's normal", (3,), "x, y, z in the world")
         length = float(np.linalg.norm(normal))
         _require(
             0 < length < np.inf,
-            f"the plane's normal {self.normal} is no direction. Give one, such as (0, 0, 1)",
+            f"the plane's normal {self.normal} is not a direction. Give one, such as (0, 0, 1)",
         )
         object.__setattr__(self, "point", tuple(float(c) for c in point))
         object.__setattr__(self, "normal", tuple(float(c) / length for c in normal))
+
+    @property
+    def axes(self) -> Float[np.ndarray, "3 3"]:
+        """World axes of a point contact on it: z the normal, x as near to the world's x as can be.
+
+        On a plane that faces along x, as near to the world's y.
+        """
+        z = np.array(self.normal)
+        nearest = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+        x = nearest - z * (z @ nearest)
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z])
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +110,18 @@ class Contact:
         _require(
             np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9)
             and np.linalg.det(rotation) > 0,
-            f"contact {label!r}: the rotation is no rotation matrix. Give orthonormal, right-"
+            f"contact {label!r}: the rotation is not a rotation matrix. Give orthonormal, right-"
             "handed columns",
         )
         object.__setattr__(self, "rotation", rotation)
         if self.polygon is not None:
-            object.__setattr__(self, "polygon", convex_polygon(self.polygon, label))
+            outline = Polygon.hull(self.polygon, f"the polygon of contact {label!r}")
+            _require(
+                len(outline) >= 2,
+                f"the polygon of contact {label!r} is a single point. Give two or more, or make "
+                "the contact a point contact",
+            )
+            object.__setattr__(self, "polygon", outline.vertices)
         for what in ("friction", "torsional_friction"):
             value = getattr(self, what)
             _require(
@@ -112,68 +134,38 @@ class Contact:
         """Which of (fx, fy, fz, mx, my, mz) this contact carries."""
         return COMPONENTS[self.kind]
 
+    @property
+    def normal_row(self) -> int:
+        """Which of its components is the normal force fz."""
+        return self.components.index(2)
+
+    @cached_property
+    def sole(self) -> Polygon | None:
+        """The polygon in which its centre of pressure must lie, in the contact frame.
+
+        None where no polygon is known, and for a point contact, whose centre of pressure is its
+        origin whatever polygon it was given.
+        """
+        if self.polygon is None or self.kind == "point":
+            return None
+        return Polygon(self.polygon)
+
+    def on(self, robot: Robot) -> Attachment:
+        """Where on a robot the contact is.
+
+        Raises:
+            UnknownNameError: the contact's frame is not in the model.
+        """
+        frame = robot.frame(self.frame)
+        offset = pin.SE3(self.rotation, np.array(self.offset))
+        return Attachment(int(frame.parentJoint), frame.placement * offset)
+
 
 def rectangle(
     x: tuple[float, float], y: tuple[float, float] = (0.0, 0.0)
 ) -> Float[np.ndarray, "4 2"]:
     """Vertices of a rectangular sole, counter-clockwise, in the contact frame [m]."""
     return np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
-
-
-def convex_polygon(points: ArrayLike, label: str = "sole") -> Float[np.ndarray, "k 2"]:
-    """The convex hull of points of a sole, counter-clockwise (two points make a segment).
-
-    Raises:
-        InvalidInputError: not a finite (k, 2) array of at least two distinct points.
-    """
-    array = finite_array(points, f"the polygon of contact {label!r}", (None, 2), "x, y [m]")
-    # Andrew's monotone chain: no dependency on a hull that refuses flat input.
-    # Rounded to the picometre: noise in x would put the points of an upright edge out of order.
-    ordered = [tuple(p) for p in np.unique(np.round(array, 12) + 0.0, axis=0)]
-    _require(
-        len(ordered) >= 2,
-        f"the polygon of contact {label!r} is a single point. Give two or more, or make the "
-        "contact a point contact",
-    )
-
-    def half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        chain: list[tuple[float, ...]] = []
-        for p in sequence:
-            while len(chain) >= 2 and _turn(chain[-2], chain[-1], p) <= 1e-15:
-                chain.pop()
-            chain.append(p)
-        return chain[:-1]
-
-    hull = np.array(half(ordered) + half(ordered[::-1]))
-    hull.flags.writeable = False
-    return hull
-
-
-def half_planes(
-    polygon: Float[np.ndarray, "k 2"],
-) -> tuple[Float[np.ndarray, "e 2"], Float[np.ndarray, " e"]]:
-    """Outward unit normals a and offsets b of a sole's edges: inside where a p <= b.
-
-    A sole of two points (a line) has its two ends as edges.
-    """
-    if len(polygon) == 2:
-        along = (polygon[1] - polygon[0]) / np.linalg.norm(polygon[1] - polygon[0])
-        normals = np.array([-along, along])
-        return normals, np.array([normals[0] @ polygon[0], normals[1] @ polygon[1]])
-    edges = np.roll(polygon, -1, axis=0) - polygon
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return normals, np.sum(normals * polygon, axis=1)
-
-
-def edge_side(normal: Float[np.ndarray, " 2"]) -> str:
-    """The side of the contact frame that an edge faces, by its outward normal."""
-    quarter = int(np.round(np.arctan2(normal[1], normal[0]) / (np.pi / 2))) % 4
-    return ("+x (front)", "+y (left)", "-x (back)", "-y (right)")[quarter]
-
-
-def _turn(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _require(condition: object, message: str) -> None:

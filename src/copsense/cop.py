@@ -1,8 +1,6 @@
-"""Centre of pressure and its kin, and how far a point is from a sole's edge."""
+"""Centre of pressure, zero-moment point and foot rotation indicator."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -10,27 +8,10 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
-from copsense.contact import Plane, edge_side, half_planes
+from copsense.contact import Plane
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
-
-
-@dataclass(frozen=True)
-class EdgeMargin:
-    """Distance of a point to the nearest edge of a sole.
-
-    Attributes:
-        distance: signed distance to that edge's line [m]; negative outside.
-        edge: index of the edge, from vertex `edge` to the next.
-        side: which side of the contact frame that edge faces, such as ``"+y (left)"``.
-        normal: the edge's outward unit normal in contact axes (2,).
-    """
-
-    distance: float
-    edge: int
-    side: str
-    normal: Float[np.ndarray, " 2"]
 
 
 def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
@@ -149,27 +130,6 @@ def foot_rotation_indicator(
         taken_f, taken_m = _resultant(stance, stance.in_world_axes(others))
         force, moment = force - taken_f, moment - taken_m
     return center_of_pressure(force, moment, plane)
-
-
-def edge_margin(polygon: Float[np.ndarray, "k 2"], point: ArrayLike) -> EdgeMargin:
-    """The margin of a point of the contact plane to a sole's nearest edge.
-
-    Args:
-        polygon: convex, counter-clockwise vertices (k, 2) [m].
-        point: (2,) in the same frame [m].
-    """
-    corners = finite_array(polygon, "the polygon", (None, 2), "x, y [m]")
-    sides = np.roll(corners, -1, axis=0) - corners
-    area = corners[:, 0] @ np.roll(corners[:, 1], -1) - corners[:, 1] @ np.roll(corners[:, 0], -1)
-    if len(corners) < 2 or area < 0 or not np.all(np.any(sides != 0, axis=1)):
-        raise InvalidInputError(
-            "the polygon does not go round a sole counter-clockwise, each vertex once. Give "
-            "Contact(..., polygon=...).polygon, which puts any points in order."
-        )
-    normals, offsets = half_planes(corners)
-    distances = offsets - normals @ finite_array(point, "the point", (2,), "x, y [m]")
-    edge = int(np.argmin(distances))
-    return EdgeMargin(float(distances[edge]), edge, edge_side(normals[edge]), normals[edge])
 
 
 def _resultant(stance: Stance, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

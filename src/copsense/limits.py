@@ -9,11 +9,10 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.optimize import linprog
-from scipy.spatial import ConvexHull, QhullError
 
-from copsense.contact import Contact, edge_side, half_planes
+from copsense.contact import Contact
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.polygon import Polygon
 from copsense.stance import Stance
 
 _ROUNDING = 1e-9  # m
@@ -219,9 +218,9 @@ def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
         mu = limits.friction
     if mu is not None:
         rows += _pyramid_rows(contact, mu, limits.friction_sides)
-    if limits.cop_margin is not None and contact.polygon is not None and contact.kind != "point":
-        _require_room(contact, contact.polygon, limits.cop_margin)
-        rows += _cop_rows(contact, contact.polygon, limits.cop_margin)
+    if limits.cop_margin is not None and contact.sole:
+        _require_room(contact, contact.sole, limits.cop_margin)
+        rows += _cop_rows(contact, contact.sole, limits.cop_margin)
     if limits.torsion == "cone" and contact.kind == "surface":
         rows += _cone_rows(contact, mu, limits.friction_sides)
     torsion = contact.torsional_friction
@@ -254,30 +253,30 @@ def _pyramid_rows(contact: Contact, mu: float, sides: int) -> list[Row]:
     return rows
 
 
-def _cop_rows(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float) -> list[Row]:
+def _cop_rows(contact: Contact, sole: Polygon, margin: float) -> list[Row]:
     """a . p <= b - margin for each edge, with p = (-m_y, m_x) / f_z and f_z >= 0."""
-    normals, offsets = half_planes(polygon)
-    if len(polygon) == 2 and contact.kind == "surface":
+    edges = list(zip(sole.normals, sole.offsets - margin, sole.edge_names, strict=True))
+    if len(sole) == 2 and contact.kind == "surface":
         # A sole that is a line has two sides too, which leave no room across it.
-        across = np.array([[-normals[1, 1], normals[1, 0]], [normals[1, 1], -normals[1, 0]]])
-        offsets = np.concatenate([offsets - margin, across @ polygon[0]])
-        normals = np.vstack([normals, across])
-    else:
-        offsets = offsets - margin
+        sides = sole.across
+        beside = np.array([a @ sole.vertices[0] for a in sides.normals])
+        names = [f"the {sides.side(i)} side" for i in range(2)]
+        edges += zip(sides.normals, beside, names, strict=True)
     return [
-        (
-            "cop",
-            f"CoP at the {edge_side(a)} edge",
-            np.array([0.0, 0.0, -b, a[1], -a[0], 0.0]),
-            0.0,
-        )
-        for a, b in zip(normals, offsets, strict=True)
+        ("cop", f"CoP at {name}", np.array([0.0, 0.0, -b, a[1], -a[0], 0.0]), 0.0)
+        for a, b, name in edges
     ]
 
 
-def _require_room(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: float) -> None:
-    """Refuse a sole without a point that far from its edges: it could carry no load at all."""
-    room = _room(tuple(map(tuple, polygon.tolist())), contact.kind == "planar")
+def _require_room(contact: Contact, sole: Polygon, margin: float) -> None:
+    """Reject a sole without a point that far from its edges: it could carry no load at all."""
+    x = 0.0 if contact.kind == "planar" else None
+    inside = sole.vertices.mean(axis=0)
+    if x is not None:
+        inside = np.array([x, np.mean(sole.section("y", x) or np.nan)])
+    if sole.margins(inside) >= margin:
+        return  # a point that proves it
+    room = _room(sole, x)
     if margin > room + _ROUNDING:
         raise InvalidInputError(
             f"the sole of {contact.name!r} has no point {margin:g} m inside its edges: the "
@@ -286,39 +285,30 @@ def _require_room(contact: Contact, polygon: Float[np.ndarray, "k 2"], margin: f
 
 
 @cache
-def _room(polygon: tuple[tuple[float, float], ...], planar: bool) -> float:
-    """Largest distance to the nearest edge of a point of the sole (with x = 0 if planar) [m]."""
-    normals, offsets = half_planes(np.array(polygon))
-    found = linprog(
-        [0.0, 0.0, -1.0],
-        A_ub=np.column_stack([normals, np.ones(len(normals))]),
-        b_ub=offsets,
-        bounds=[(0.0, 0.0) if planar else (None, None), (None, None), (None, None)],
-    )
-    return -float(found.fun)
+def _room(sole: Polygon, x: float | None) -> float:
+    return sole.room(x)
 
 
 def _cone_rows(contact: Contact, mu: float | None, sides: int) -> list[Row]:
     """Faces of the cone of wrenches that friction forces at the sole's vertices can make up."""
-    if mu is None or contact.polygon is None or len(contact.polygon) < 3:
+    sole = contact.sole
+    if mu is None or sole is None or len(sole) < 3:
         raise InvalidInputError(
             f"the wrench cone of contact {contact.name!r} needs a friction coefficient and a sole "
             "of three points or more. Give both, or another torsion limit."
         )
-    if len(contact.polygon) > _CONE_VERTICES:
+    if len(sole) > _CONE_VERTICES:
         raise InvalidInputError(
-            f"the sole of {contact.name!r} has {len(contact.polygon)} vertices; its exact wrench "
-            f"cone is made for {_CONE_VERTICES} at most. Give a simpler polygon, such as "
+            f"the sole of {contact.name!r} has {len(sole)} vertices; its exact wrench cone "
+            f"is made for {_CONE_VERTICES} at most. Give a simpler polygon, such as "
             "rectangle(...)."
         )
-    faces = _unit_cone(tuple(map(tuple, contact.polygon.tolist())), mu, sides)
+    faces = _unit_cone(sole, mu, sides)
     return [("wrench cone", f"wrench cone, face {i}", row, 0.0) for i, row in enumerate(faces)]
 
 
 @cache
-def _unit_cone(
-    polygon: tuple[tuple[float, float], ...], mu: float, sides: int
-) -> tuple[Float[np.ndarray, " 6"], ...]:
+def _unit_cone(sole: Polygon, mu: float, sides: int) -> tuple[Float[np.ndarray, " 6"], ...]:
     """Face normals of the wrench cone; each vertex pushes with f_z = 1 along the pyramid's edges.
 
     Their section at f_z = 1 is a polytope over (fx, fy, mx, my, mz); a face of it,
@@ -328,10 +318,12 @@ def _unit_cone(
         raise InvalidInputError(
             "without friction there is no wrench cone: use friction and CoP rows."
         )
+    from scipy.spatial import ConvexHull, QhullError  # slow to import, and seldom needed
+
     angles = 2 * np.pi * np.arange(sides) / sides
     points = [
         (fx := mu * np.cos(t), fy := mu * np.sin(t), y, -x, x * fy - y * fx)
-        for x, y in polygon
+        for x, y in sole.vertices.tolist()
         for t in angles
     ]
     array = np.array(points)

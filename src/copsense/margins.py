@@ -264,6 +264,4 @@ def margin_table(stance: Stance, limits: Limits) -> MarginTable:
 def _normal_rows(contacts: Sequence[Contact]) -> np.ndarray:
     """Row of the normal force of each contact in stacked forces."""
     starts = np.cumsum([0, *(len(contact.components) for contact in contacts)])
-    return np.array(
-        [start + c.components.index(2) for c, start in zip(contacts, starts, strict=False)]
-    )
+    return np.array([start + c.normal_row for c, start in zip(contacts, starts, strict=False)])

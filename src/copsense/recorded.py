@@ -13,6 +13,7 @@ from copsense.contact import Contact, Kind
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits, rows_of
 from copsense.margins import UNITS, MarginTable
+from copsense.polygon import unpadded
 
 
 def with_limit_margins(dataset: xr.Dataset, limits: Limits) -> xr.Dataset:
@@ -64,14 +65,12 @@ def _contacts(dataset: xr.Dataset) -> tuple[Contact, ...]:
     kinds = str(dataset.attrs["contact_kinds"]).split(", ")
     found = []
     for k, (name, kind) in enumerate(zip(names, kinds, strict=True)):
-        polygon = dataset["sole_polygon"].values[k] if "sole_polygon" in dataset else None
-        if polygon is not None and np.any(np.isnan(polygon)):
-            polygon = None
+        sole = unpadded(dataset["sole_polygon"].values[k]) if "sole_polygon" in dataset else None
         found.append(
             Contact(
                 name,
                 cast(Kind, kind),
-                polygon=polygon,
+                polygon=sole.vertices if sole else None,
                 friction=_given(dataset, "friction", k),
                 torsional_friction=_given(dataset, "torsional_friction", k),
             )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,9 +19,19 @@ from jaxtyping import Float
 from copsense.arrays import owned
 from copsense.robot import Robot
 
-# Where something is attached to a robot: a joint of the model, and the placement on it.
-Attachment = tuple[int, pin.SE3]
 _LOCAL = pin.ReferenceFrame.LOCAL
+
+
+class Attachment(NamedTuple):
+    """Where on a robot something is, such as a contact.
+
+    Attributes:
+        joint: index in the model of the joint whose link carries it.
+        placement: of its frame in that joint's frame.
+    """
+
+    joint: int
+    placement: pin.SE3
 
 
 class _Scratch:

@@ -10,7 +10,6 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
-from copsense.contact import half_planes
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
@@ -238,11 +237,11 @@ class CopSensitivity:
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
         shares = self.equilibrium.wrenches[:, 2] / stance.robot.weight
         for k, contact in enumerate(stance.contacts):
-            if contact.polygon is None or contact.kind == "point":
+            if contact.sole is None:
                 continue
             # s = w (b - a p),   ds/dCoM = (b - a p) dw/dCoM - w a' Gamma
-            a, b = half_planes(contact.polygon)
-            w, margin = float(shares[k]), b - a @ self.cop[k]
+            a, margin = contact.sole.normals, contact.sole.distances(self.cop[k])
+            w = float(shares[k])
             slack = w * margin
             rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
             speed = np.linalg.norm(rate, axis=1)

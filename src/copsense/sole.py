@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import coal
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_number
-from copsense.contact import Contact, convex_polygon
+from copsense.contact import Contact
 from copsense.description import mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError
-from copsense.robot import Robot, build_model
+from copsense.polygon import Polygon
+from copsense.robot import Robot
 
 THICKNESS = 1e-3  # m: what lies within this of the lowest point belongs to the sole
 _RIM = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)  # samples of a round rim
@@ -53,14 +53,13 @@ def read_sole(robot: Robot, contact: Contact, *, thickness: float = THICKNESS) -
     vertices = _foot_vertices(robot, contact)
     lowest = float(vertices[:, 2].min())
     sole = vertices[vertices[:, 2] <= lowest + thickness]
-    try:
-        polygon = convex_polygon(sole[:, :2], contact.name)
-    except InvalidInputError:
+    outline = Polygon.hull(sole[:, :2], f"the sole of contact {contact.name!r}")
+    if len(outline) < 2:
         raise ModelLoadError(
             f"the collision geometry under frame {contact.frame!r} touches the ground in a single "
             "point: it has no sole. Use a point contact, or give the polygon."
-        ) from None
-    return Sole(lowest, polygon)
+        )
+    return Sole(lowest, outline.vertices)
 
 
 def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
@@ -71,9 +70,10 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
             f"robot {robot.name!r} was given as a model, without geometry. Give each contact its "
             "polygon, or load the robot from its URDF or MJCF."
         )
-    model = build_model(description)  # unreduced: geometry hangs on the joints of the file
-    frame = model.frames[model.getFrameId(contact.frame)]
-    joint, axes = frame.parentJoint, frame.placement * pin.SE3(contact.rotation, np.zeros(3))
+    # Unreduced: geometry hangs on the joints of the file.
+    whole = Robot.from_description(description, name=robot.name)
+    model, at_frame = whole.model, replace(contact, offset=(0.0, 0.0, 0.0)).on(whole)
+    joint, axes = at_frame.joint, at_frame.placement
     try:
         if description.language == "urdf":
             links = {f.name for f in model.frames if f.parentJoint == joint}
@@ -105,6 +105,8 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
 
 def _shape_vertices(shape: pin.GeometryObject, axes: pin.SE3) -> Float[np.ndarray, "k 3"]:
     """Points of a shape, in its own frame, among which its lowest ones are."""
+    import coal  # slow to load, and seldom needed
+
     geometry = shape.geometry
     if isinstance(geometry, coal.Box):
         signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from copsense import rigid_body
 from copsense.arrays import array_property, read_only
-from copsense.contact import COMPONENT_NAMES, Contact
+from copsense.contact import COMPONENT_NAMES, Contact, Plane
 from copsense.errors import (
     ContactGeometryError,
     InsufficientContactsError,
@@ -367,30 +367,13 @@ def _layout(robot: Robot, contacts: tuple[Contact, ...]) -> _Layout:
     owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
     return _Layout(
         names,
-        tuple(_attachment(robot, contact) for contact in contacts),
-        tuple(_plane_axes(c) if c.kind == "point" else None for c in contacts),
+        tuple(contact.on(robot) for contact in contacts),
+        tuple((c.plane or Plane()).axes if c.kind == "point" else None for c in contacts),
         tuple(slice(int(a), int(b)) for a, b in pairwise(ends)),
         tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in contacts for i in c.components),
         read_only(component),
         read_only(6 * owner + component),
     )
-
-
-def _attachment(robot: Robot, contact: Contact) -> Attachment:
-    """The joint that carries a contact, and the contact frame's placement on it."""
-    frame = robot.frame(contact.frame)
-    return int(frame.parentJoint), frame.placement * pin.SE3(
-        contact.rotation, np.array(contact.offset)
-    )
-
-
-def _plane_axes(contact: Contact) -> Float[np.ndarray, "3 3"]:
-    """World axes of a point contact: z the plane's normal, x the nearest to the world's x."""
-    z = np.array(contact.plane.normal if contact.plane else (0.0, 0.0, 1.0))
-    nearest = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    x = nearest - z * (z @ nearest)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _check_plane(contact: Contact, foot: pin.SE3) -> None:

@@ -11,11 +11,11 @@ import xarray as xr
 
 from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
-from copsense.cop import edge_margin
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits, torque_limits
 from copsense.path import PosturePath
+from copsense.polygon import padded
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
@@ -160,11 +160,11 @@ def _margins(row: CopSensitivity) -> list[tuple[float, str]]:
     """Margin and side of each contact; a contact without a sole has no edge to reach."""
     found = []
     for contact, cop in zip(row.equilibrium.stance.contacts, row.cop, strict=True):
-        if contact.polygon is None or contact.kind == "point":
-            found.append((np.inf, ""))
-        else:
-            margin = edge_margin(contact.polygon, cop)
+        if contact.sole:
+            margin = contact.sole.margin(cop)
             found.append((margin.distance, margin.side))
+        else:
+            found.append((np.inf, ""))
     return found
 
 
@@ -253,10 +253,11 @@ def _dataset(
         np.where(np.isfinite(torque), torque, np.nan),
         {"units": "N m", "long_name": "effort limit of the model; NaN where it has none"},
     )
-    if any(c.polygon is not None for c in stance.contacts):
+    soles = [c.sole for c in stance.contacts]
+    if any(soles):
         data["sole_polygon"] = (
             ("contact", "vertex", "axis"),
-            _padded([c.polygon for c in stance.contacts]),
+            padded(soles),
             {
                 "units": "m",
                 "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",
@@ -291,7 +292,7 @@ def _dataset(
         "contact_frames": ", ".join(c.frame for c in stance.contacts),
         "contact_kinds": ", ".join(c.kind for c in stance.contacts),
         "without_sole": ", ".join(
-            c.name for c in stance.contacts if c.kind != "point" and c.polygon is None
+            c.name for c in stance.contacts if c.kind != "point" and c.sole is None
         ),
         "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
         "the robot, force first; base velocity in the base's frame",
@@ -307,9 +308,3 @@ def variable_name(name: str, taken: set[str]) -> str:
     while plain in taken:
         plain += "_"
     return plain
-
-
-def _padded(polygons: list[np.ndarray | None]) -> np.ndarray:
-    known = [np.full((1, 2), np.nan) if p is None else p for p in polygons]
-    longest = max(len(p) for p in known)
-    return np.array([np.vstack([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in known])

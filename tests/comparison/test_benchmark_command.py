@@ -14,7 +14,7 @@ PLAN = """
 source = "icub"
 soles = { l_sole = [-0.05, 0.1, -0.01, 0.03], r_sole = [-0.05, 0.1, -0.03, 0.01] }
 [postures.straight]
-knees = 0
+knees_deg = 0
 [controllers.one]
 criterion = "minimum-wrench"
 [controllers.wide]
@@ -123,8 +123,8 @@ def test_a_picture_shows_bounds_failures_and_predictions():
     [
         (["icubb"], "icub"),
         (["icub", "--criterion", "best"], "best"),
-        (["icub", "--posture", "sitting"], "own, straight, knees=RAD"),
-        (["icub", "--posture", "knees=a"], "knees=RAD"),
+        (["icub", "--posture", "sitting"], "own, straight, knees=DEG"),
+        (["icub", "--posture", "knees=a"], "an angle, such as 20 (degrees)"),
         (["solo12", "--posture", "straight"], "joints in a plan file"),
         (["icub", "--disturbance", "dance"], "dance"),
         (["icub", "--disturbance", "lean:speed"], "TRIAL[:OPTION=VALUE"),
@@ -155,8 +155,11 @@ def test_bad_options_are_one_clear_line(options, says):
     [
         (("[robots.narrow]", "[robot.narrow]"), "robots"),
         (("[robots.narrow]", "[robots.narrow"), "not valid TOML"),
-        (("knees = 0", 'knees = "bent"'), "postures.straight"),
-        (("knees = 0", "knee = 0"), "knees"),
+        (("knees_deg = 0", 'knees_deg = "bent"'), "postures.straight"),
+        (
+            ("knees_deg = 0", "knees = 0"),
+            "no field of PostureTable named 'knees'. Did you mean knees_deg",
+        ),
         (("reach = 0.015", "reach = -1"), "reach"),
         (('kind = "falls"', 'kind = "tumbles"'), "tumbles"),
         (("motors = {", "engines = {"), "engines"),
@@ -170,8 +173,8 @@ def test_bad_options_are_one_clear_line(options, says):
         (("[-0.05, 0.1, -0.01, 0.03]", "[0.1, -0.05, -0.01, 0.03]"), "x0 < x1"),
         (("reach = 0.015", "scores = 3"), "named 'scores'"),
         (("reach = 0.015", 'reach = "far"'), "reach is not valid: expected a number"),
-        (("knees = 0", 'name = "x"'), "Leave it out"),
-        (("knees = 0", "joints_deg = 3"), "joints_deg is not valid: expected a table"),
+        (("knees_deg = 0", 'name = "x"'), "Leave it out"),
+        (("knees_deg = 0", "joints_deg = 3"), "joints_deg is not valid: expected a table"),
         (("l_sole = [-0.05, 0.1, -0.01, 0.03]", "l_sole = 3"), "soles"),
         (("soles = {", "contacts = 'l_sole' #"), "contacts is not valid: expected a list"),
         (('source = "icub"', "source = 3"), "source is not valid: expected a text"),

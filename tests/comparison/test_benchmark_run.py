@@ -99,7 +99,7 @@ def test_a_killed_command_is_taken_up_again(whole, tmp_path):
     file.write_text(
         '[robots.narrow]\nsource = "icub"\n'
         "soles = { l_sole = [-0.05, 0.1, -0.01, 0.03], r_sole = [-0.05, 0.1, -0.03, 0.01] }\n"
-        "[postures.straight]\nknees = 0\n"
+        "[postures.straight]\nknees_deg = 0\n"
         '[controllers.minimum-wrench]\ncriterion = "minimum-wrench"\n'
         '[controllers.minimum-torque]\ncriterion = "minimum-torque"\n'
         "[trials.lean]\nreach = 0.015\nspeed = 0.02\n[trials.rest]\nduration = 0.1\n"

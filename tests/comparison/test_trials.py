@@ -183,6 +183,7 @@ def test_a_point_lifts_or_slips_where_the_statics_say(choice, how):
     (case,) = make_plan([RobotChoice("solo12")], [PostureChoice()], [choice], [Lean(speed=0.03)])
     (run,) = run_case(case)
     assert how in run.reason
+    assert run.how == {"left the ground": "lifts", "slipped": "slips"}[how]
     # A slip is seen when it is 20 mm, a lift when it is 2 mm.
     assert -1e-3 < run.value - found.excursion < 1e-2
     assert run.predicted == pytest.approx(found.excursion, rel=1e-4)  # on another path's grid

@@ -11,11 +11,11 @@ from support.reproductions import small_reproduction
 
 import copsense
 from copsense import plots
-from copsense.cop import edge_margin
 from copsense.errors import InvalidInputError, OutputError
 from copsense.paper.report import paper_plots
-from copsense.plots.reading import cross_section, world_soles
+from copsense.plots.reading import world_soles
 from copsense.plots.style import colours
+from copsense.polygon import Polygon
 
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 WHOLE = [plots.plot_results, plots.plot_soles, plots.plot_sensitivity, plots.plot_torques]
@@ -81,7 +81,7 @@ def test_the_edges_are_drawn_where_the_soles_end(lateral):
         own = [h for h in heights if abs(h - origin) < 60]
         assert len(own) == 2
         for height in own:
-            margin = edge_margin(polygon, (x, (height - origin) / 1e3))
+            margin = Polygon(polygon).margin((x, (height - origin) / 1e3))
             assert margin.distance == pytest.approx(0.0, abs=1e-7)
 
 
@@ -211,11 +211,11 @@ def test_a_cop_across_a_pole_is_not_joined(icub):
 def test_a_cross_section_of_a_box_ends_on_its_sides(turn):
     box = np.array([[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]])
     c, s = np.cos(turn), np.sin(turn)
-    low, high = cross_section(box @ np.array([[c, s], [-s, c]]), "y", 0.0)
+    low, high = Polygon(box @ np.array([[c, s], [-s, c]])).section("y", 0.0)
     # through the centre: the half-length is that of a ray to the nearer pair of sides
     half = min(1.0 / max(abs(c), 1e-12), 2.0 / max(abs(s), 1e-12))
     assert (low, high) == pytest.approx((-half, half))
-    assert cross_section(box, "y", 2.5) is None
+    assert Polygon(box).section("y", 2.5) is None
 
 
 def test_the_soles_are_turned_with_their_feet(lateral):

@@ -29,7 +29,7 @@ def test_bipeds_face_x_with_the_left_foot_at_y(stance_of, name):
     assert left.translation[1] > 0.03 > -0.03 > right.translation[1]
     for place, contact in zip(stance.placements, stance.contacts, strict=True):
         assert place.rotation[0, 0] > 0.9
-        assert copsense.edge_margin(contact.polygon, (0.0, 0.0)).distance > 0.02
+        assert copsense.Polygon(contact.polygon).margin((0.0, 0.0)).distance > 0.02
 
 
 def test_four_bar_stands_as_the_papers_at_a_right_angle(stance_of):

@@ -93,7 +93,7 @@ def test_an_engine_does_not_start_over_in_silence():
     engine = simulator()
     engine.reset()
     torques = np.full(N, 1e12)
-    with pytest.raises(SimulatorStoppedError, match="MuJoCo gave up"):
+    with pytest.raises(SimulatorStoppedError, match="MuJoCo stopped"):
         list(map(engine.step, [torques] * 50))
 
 
@@ -229,7 +229,7 @@ def test_a_controller_as_a_class():
 
 
 def test_a_control_period_that_does_not_fit():
-    with pytest.raises(InvalidInputError, match=r"no multiple.*time step"):
+    with pytest.raises(InvalidInputError, match=r"not a multiple.*time step"):
         rollout(Statue(icub()), zero, Scenario(0.1, control_period=1.5e-3))
 
 

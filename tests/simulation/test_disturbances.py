@@ -313,7 +313,7 @@ def test_what_does_not_fit_is_refused():
         run(Scenario(0.1, friction=(FrictionChange(0.1, 0.0, "left"),)))
     with pytest.raises(UnknownNameError, match="loaded"):
         run(Scenario(0.1, odometry="left"))
-    with pytest.raises(InvalidInputError, match="point contact says nothing"):
+    with pytest.raises(InvalidInputError, match="does not follow from a point contact"):
         FootOdometry(copsense.load_stance("solo12"), "loaded")
     with pytest.raises(UnknownNameError, match="payload"):
         run(Scenario(0.1, model_error=ModelError(payload={"hand": 1.0})))
@@ -381,7 +381,7 @@ def test_a_users_controller_is_one_class_or_one_function(own_module):
     ("name", "error", "says"),
     [
         ("Limpp", UnknownNameError, "Did you mean limp"),
-        ("number", InvalidInputError, "no controller"),
+        ("number", InvalidInputError, "not a controller"),
         ("broken", ControllerError, "no batteries"),
     ],
 )

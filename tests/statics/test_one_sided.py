@@ -149,7 +149,7 @@ def test_icubs_first_activation(icub, criterion, printed, side):
         at, _ = lateral(icub, y, icub.q)
         found = copsense.solve_equilibrium(at, criterion)
         return min(
-            copsense.edge_margin(c.polygon, p).distance
+            copsense.Polygon(c.polygon).margin(p).distance
             for c, p in zip(at.contacts, contact_cops(found), strict=True)
         )
 
@@ -182,7 +182,7 @@ def test_saturated_cop_has_no_slope_along_the_edges_normal(icub):
             assert pressing
             held = 0
             for k, contact in enumerate(here.contacts):
-                margin = copsense.edge_margin(contact.polygon, found.cop[k])
+                margin = copsense.Polygon(contact.polygon).margin(found.cop[k])
                 if margin.distance < 1e-10:
                     assert np.abs(margin.normal @ found.matrix[k]).max() < 1e-9
                     held += 1

@@ -199,9 +199,8 @@ def _feet(stance: Stance, turns: list[np.ndarray], edges: list[np.ndarray]) -> F
     axes, plane = np.zeros((nc, 9)), np.zeros((nc, 6))
     point = np.array([c.kind == "point" for c in contacts], dtype=np.int64)
     for k, contact in enumerate(contacts):
-        frame = robot.frame(contact.frame)
-        body[k] = frame.parentJoint - 1
-        place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+        at = contact.on(robot)
+        body[k], place = at.joint - 1, at.placement
         placement[k, :9] = (turns[body[k]].T @ place.rotation).T.ravel()
         placement[k, 9:] = turns[body[k]].T @ place.translation
         if point[k]:
@@ -241,10 +240,9 @@ def _supports(stance: Stance, body: np.ndarray) -> tuple[np.ndarray, ...]:
     model = stance.robot.model
     n = model.njoints - 2
     holds: list[list[int]] = [[] for _ in range(n + 1)]
-    for k in range(len(body)):
-        for joint in model.supports[int(body[k]) + 1]:
-            if joint > 1:
-                holds[joint - 1].append(k)
+    for k, contact in enumerate(stance.contacts):
+        for joint in stance.limb(contact):
+            holds[joint - 1].append(k)
     support = [i for i in range(1, n + 1) if holds[i]]
     sets = sorted({tuple(holds[i]) for i in support})
     member = np.zeros((len(sets), len(body)), dtype=np.int64)

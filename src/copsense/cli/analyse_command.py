@@ -139,7 +139,7 @@ def _answer(
     stance: Stance, results: dict[str, CopSensitivity], tangent: Any, along: str | None
 ) -> dict[str, Any]:
     """The analysis as plain data."""
-    from copsense.cop import edge_margin, total_center_of_pressure
+    from copsense.cop import total_center_of_pressure
 
     robot = stance.robot
     criteria: dict[str, Any] = {}
@@ -161,8 +161,8 @@ def _answer(
             }
             if joint_slope is not None:
                 row[f"cop_per_{along}"] = joint_slope[k]
-            if contact.polygon is not None:
-                margin = edge_margin(contact.polygon, result.cop[k])
+            if contact.sole:
+                margin = contact.sole.margin(result.cop[k])
                 row |= {"margin": margin.distance, "margin_side": margin.side}
             per_contact[contact.name] = row
         criteria[name] = {

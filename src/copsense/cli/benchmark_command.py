@@ -16,6 +16,7 @@ import click
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import echo_json, echo_written
+from copsense.cli.quantities import Unit, read_quantity
 from copsense.errors import InvalidInputError, MissingExtraError
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     "postures",
     multiple=True,
     metavar="WORDS",
-    help="own, straight, or knees=RAD and width=M with a comma between. Repeatable; default "
-    "straight and knees=0.6 for the robots whose knees are known, own for others.",
+    help="own, straight, or knees=DEG and width=M with a comma between. Repeatable; default "
+    "straight and knees=0.6rad for the robots whose knees are known, own for others.",
 )
 @click.option(
     "--disturbance",
@@ -194,7 +195,7 @@ def _plan(
         robot = RobotChoice(source, contacts=contacts)
         chosen = [_posture(text) for text in dict.fromkeys(postures)]
         if not chosen:
-            usual = ("straight",) if quick else ("straight", "knees=0.6")
+            usual = ("straight",) if quick else ("straight", "knees=0.6rad")
             chosen = [_posture(text) for text in usual]
             try:
                 chosen[0].angles(source)
@@ -223,18 +224,16 @@ def _posture(text: str) -> PostureChoice:
 
     if text in ("own", "straight"):
         return PostureChoice(text, 0.0 if text == "straight" else None)
+    units: dict[str, Unit] = {"knees": "rad", "width": "m"}
     values: dict[str, float] = {}
     for part in text.split(","):
-        name, _, number = part.partition("=")
-        try:
-            values[name] = float(number)
-        except ValueError:
-            name = ""
-        if name not in ("knees", "width"):
+        name, _, value = part.partition("=")
+        if name not in units:
             raise InvalidInputError(
-                f"the posture {text!r} is not understood. Give own, straight, knees=RAD, width=M, "
-                "or knees=0.6,width=0.2; joints by name in a plan file."
+                f"the posture {text!r} is not understood. Give own, straight, knees=DEG, width=M, "
+                "or knees=40,width=0.2; joints by name in a plan file."
             )
+        values[name] = read_quantity(value, units[name])
     return PostureChoice(text, values.get("knees"), values.get("width"))
 
 
@@ -352,9 +351,6 @@ def _ranked(row: Any, alike: bool) -> str:
     return f"{row.controller} {row.mean_rank:.2g}" + (f" ({', '.join(said)})" if said else "")
 
 
-_VERBS = {"slipped": "slips", "left the ground": "lifts"}
-
-
 _UNMEASURED = {"failed": "failed", "tipped": "not measured", "none": "nothing to measure"}
 
 
@@ -377,5 +373,4 @@ def _value(row: Any, factor: float) -> str:
     text += f", {', '.join(said)}" if said else ""
     if not row.contact:
         return text
-    how = [verb for words, verb in _VERBS.items() if f"{row.contact} {words}" in row.reason]
-    return f"{text}; {row.contact} {how[0] if how else 'tips'}"
+    return f"{text}; {row.contact} {row.how}"

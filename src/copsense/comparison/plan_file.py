@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -21,13 +22,30 @@ from copsense.errors import (
 from copsense.simulation import Scenario
 
 
+@dataclass(frozen=True)
+class PostureTable:
+    """A posture as a plan file has it, with the unit of each position in its key.
+
+    Attributes:
+        knees_deg: bend of both knees [deg], see `PostureChoice.knees`.
+        width: between the feet [m].
+        joints_deg: joint -> angle [deg].
+        joints_m: prismatic joint -> position [m].
+    """
+
+    knees_deg: float | None = None
+    width: float | None = None
+    joints_deg: Mapping[str, float] = field(default_factory=dict)
+    joints_m: Mapping[str, float] = field(default_factory=dict)
+
+
 def read_plan(path: str | Path) -> tuple[Case, ...]:
     """A plan from a TOML file.
 
     Tables ``[robots.NAME]``, ``[postures.NAME]``, ``[controllers.NAME]``, ``[conditions.NAME]`` and
-    ``[trials.NAME]`` hold the fields of `RobotChoice`, `PostureChoice` (joints as ``joints_deg``),
-    `ControllerChoice`, a scenario and a trial (with its ``kind``). The plan is their product, or
-    that of each ``[[block]]``, which lists names: ``robots = ["icub"]``.
+    ``[trials.NAME]`` hold the fields of `RobotChoice`, `PostureTable`, `ControllerChoice`, a
+    scenario and a trial (with its ``kind``). The plan is their product, or that of each
+    ``[[block]]``, which lists names: ``robots = ["icub"]``.
 
     Raises:
         InvalidInputError: no such file, not TOML, or a value that is not valid.
@@ -112,10 +130,14 @@ def _robot(name: str, table: dict[str, Any]) -> RobotChoice:
 
 
 def _posture(name: str, table: dict[str, Any]) -> PostureChoice:
-    if "joints_deg" in table:
-        degrees = structure(table.pop("joints_deg"), dict[str, float], "joints_deg")
-        table["joints"] = {joint: math.radians(angle) for joint, angle in degrees.items()}
-    return structure(table | {"name": name}, PostureChoice)
+    found: PostureTable = structure(table, PostureTable)
+    joints = {joint: math.radians(angle) for joint, angle in found.joints_deg.items()}
+    return PostureChoice(
+        name,
+        None if found.knees_deg is None else math.radians(found.knees_deg),
+        found.width,
+        (joints | dict(found.joints_m)) or None,
+    )
 
 
 def _controller(name: str, table: dict[str, Any]) -> ControllerChoice:
@@ -132,8 +154,8 @@ def _conditions(name: str, table: dict[str, Any]) -> Conditions:
     return Conditions(
         name,
         {
-            field: structure(value, hints[field], field) if field in hints else value
-            for field, value in table.items()
+            key: structure(value, hints[key], key) if key in hints else value
+            for key, value in table.items()
         },
     )
 

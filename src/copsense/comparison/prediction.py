@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from copsense.contact import half_planes
 from copsense.controllers import STIFF, Gains, PathReference
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
@@ -107,19 +106,17 @@ def statics(
             continue
         cops = contact_cops(equilibrium)
         for contact, cop in zip(path.stances[i].contacts, cops, strict=True):
-            if contact.polygon is not None and contact.kind != "point":
-                normals, offsets = half_planes(contact.polygon)
-                margins[row] = min(margins[row], float((offsets - normals @ cop).min()))
+            if contact.sole:
+                margins[row] = min(margins[row], float(contact.sole.margins(cop)))
     start = int(np.argmin(np.abs(values)))
     here = cop_sensitivity(path.stances[start], criterion, limits)
     tangent = path.tangents[start]
     slopes = here.gradient @ tangent
     edges, rates = [np.zeros(0)], [np.zeros(0)]
     for k, contact in enumerate(path.stances[start].contacts):
-        if contact.polygon is not None and contact.kind != "point":
-            normals, offsets = half_planes(contact.polygon)
-            edges.append(offsets - normals @ here.cop[k])
-            rates.append(-normals @ slopes[k])
+        if contact.sole:
+            edges.append(contact.sole.distances(here.cop[k]))
+            rates.append(-contact.sole.normals @ slopes[k])
     # The path's posture nearest to the start is a little off it.
     off = float(values[start])
     rate = np.concatenate(rates)

@@ -25,8 +25,9 @@ class Score:
         high: upper end.
         predicted: by the statics along the exact path; NaN where they say nothing.
         first_order: by statics and sensitivity at the start alone.
-        contact: which contact tipped first, or nothing.
-        predicted_contact: which one should.
+        contact: the contact that tipped, lifted or slipped first, or empty.
+        how: ``"tips"``, ``"lifts"`` or ``"slips"``, or empty.
+        predicted_contact: the contact that should do so, by the statics.
         runs: how many rollouts it took.
         reason: how the run ended, or why it failed.
     """
@@ -39,6 +40,7 @@ class Score:
     predicted: float = math.nan
     first_order: float = math.nan
     contact: str = ""
+    how: str = ""
     predicted_contact: str = ""
     runs: int = 1
     reason: str = ""

@@ -52,7 +52,7 @@ def _lean(trial: Lean, runner: CaseRunner) -> list[Score]:
     tipped = bool(run.attrs["tip_contact"])
     tip = abs(float(run["tip_com"].sel(com_axis="y")) - float(runner.stance.com[1]))
     reason = _and(str(run.attrs["end_reason"]), note)
-    row = Score("tip_excursion", "failed", reason=reason, contact=str(run.attrs["tip_contact"]))
+    row = _with_contact(Score("tip_excursion", "failed", reason=reason), run)
     if tipped:
         step = trial.speed * float(run.attrs["control_period"])
         row = _measured(row, tip, step)
@@ -99,8 +99,10 @@ def _sway(trial: Sway, runner: CaseRunner) -> list[Score]:
             if expected is not None and name != "com_error":
                 on_path, first_order = getattr(expected, name)(y)
                 rows[name] = replace(rows[name], predicted=on_path, first_order=first_order)
-    elif contact := str(run.attrs["tip_contact"]):  # a CoP reached the edge
-        rows = {name: replace(row, status="tipped", contact=contact) for name, row in rows.items()}
+    elif run.attrs["tip_contact"]:  # a CoP reached the edge
+        rows = {
+            name: _with_contact(replace(row, status="tipped"), run) for name, row in rows.items()
+        }
         margin = replace(rows["smallest_margin"], status="bound", low=-math.inf, high=0.0)
     if expected is not None:
         on_path, first_order = expected.smallest_margin(*_extent(trial))
@@ -128,7 +130,7 @@ def _push(trial: PushToTip, runner: CaseRunner) -> list[Score]:
     found = bisect(survives, 0.0, largest, 2 * trial.resolution)
     row = _bracketed("tip_impulse", found, "a push of", note)
     if found.failed in tips:
-        row = replace(row, contact=str(tips[found.failed].attrs["tip_contact"]))
+        row = _with_contact(row, tips[found.failed])
     if expected is None:
         return [row]
     return [
@@ -197,7 +199,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
     reference = runner.reference(Sine(trial.amplitude, trial.frequency))
     values = dict(runner.case.conditions.values or {})
     motors, noise = values.get("motors", Motors()), values.get("noise", Noise())
-    contacts: dict[float, str] = {}
+    runs: dict[float, xr.Dataset] = {}
 
     def survives(value: float) -> bool:
         changes: dict[str, Any]
@@ -209,7 +211,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
         else:
             changes = {"motors": replace(motors, **{trial.parameter: value})}
         run = runner.run(reference, 1.0 / trial.frequency, **changes)
-        contacts[value] = str(run.attrs["tip_contact"])
+        runs[value] = run
         return run.attrs["end_kind"] == "completed"
 
     assert trial.mild is not None
@@ -217,7 +219,8 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
     assert trial.step is not None
     found = bisect(survives, trial.mild, trial.severe, trial.step)
     row = _bracketed(trial.scores[0], found, f"a {trial.parameter.replace('_', ' ')} of")
-    row = replace(row, contact=contacts.get(found.failed, ""))
+    if found.failed in runs:
+        row = _with_contact(row, runs[found.failed])
     if trial.parameter != "torque_limit":
         return [row]
     expected, note = runner.statics(reference)
@@ -228,6 +231,12 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
     y = np.linspace(-trial.amplitude, trial.amplitude, 201)
     on_path, first_order = expected.torque_peak(y, legs)
     return [replace(row, predicted=on_path, first_order=first_order)]
+
+
+def _with_contact(row: Score, run: xr.Dataset) -> Score:
+    """A row with the contact that tipped, lifted or slipped first in a run, and how."""
+    kind = str(run.attrs["tip_kind"])
+    return replace(row, contact=str(run.attrs["tip_contact"]), how=f"{kind}s" if kind else "")
 
 
 def _extent(trial: Sway) -> tuple[float, float]:

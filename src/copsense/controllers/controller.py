@@ -1,4 +1,4 @@
-"""Controller: what a balancing law sees and returns, and how its answer is checked."""
+"""Controller: what a controller receives and returns, and how its answer is validated."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from copsense.errors import ControllerError, InvalidInputError
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """What a controller knows at one instant.
+    """What a controller receives at one instant.
 
     Attributes:
         time: since the start [s].
         q: measured configuration (nq,): base position, quaternion (x, y, z, w), joints.
         v: measured velocity (nv,): the base in its own frame, then the joints.
-        target: what the robot should do now.
+        target: where the robot should be now, and how it should move.
         wrenches: measured wrench of the environment at each contact (nc, 6), contact axes, force
             first [N, Nm]; zero before the first step.
     """
@@ -36,7 +36,7 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """A controller's answer, with the contact wrenches that it means to cause.
+    """A controller's torques, with the contact wrenches that they should cause.
 
     Attributes:
         torques: joint torques (n,) in the robot's order [Nm, N].
@@ -49,21 +49,21 @@ class Command:
 
 @runtime_checkable
 class Controller(Protocol):
-    """State in, torques out: any callable, a function or an object with ``__call__``."""
+    """Any callable from an observation to torques: a function or an object with ``__call__``."""
 
     def __call__(self, observation: Observation) -> Command | Float[np.ndarray, " n"]:
         """The torques to apply until the next call, alone or in a `Command`."""
 
 
 def controller_name(controller: object) -> str:
-    """How a controller is called in results.
+    """What results call a controller.
 
     Raises:
-        InvalidInputError: it cannot be called.
+        InvalidInputError: it is not callable.
     """
     if not callable(controller):
         raise InvalidInputError(
-            f"{controller!r} is no controller. Give a callable observation -> torques, such as "
+            f"{controller!r} is not a controller. Give a callable observation -> torques, such as "
             "BalancingController(stance, minimum_torque())."
         )
     for attribute in ("name", "__name__"):
@@ -75,32 +75,32 @@ def controller_name(controller: object) -> str:
 def ask(
     controller: Controller | Callable[[Observation], object], observation: Observation, n: int
 ) -> Command:
-    """Call a controller and check what it returns.
+    """Call a controller and validate what it returns.
 
     Args:
         controller: the controller.
-        observation: what it sees.
-        n: how many torques there must be.
+        observation: what it receives.
+        n: the number of torques.
 
     Raises:
-        ControllerError: it raised, or returned no finite torques (n,); the message says when.
+        ControllerError: it raised, or did not return n finite torques; the message says when.
     """
     when = f"controller {controller_name(controller)!r} at {observation.time:.3f} s"
     try:
         answer = controller(observation)
     except (Exception, SystemExit) as error:
         raise ControllerError(
-            f"{when} raised {type(error).__name__}: {error}. Mend the controller at this state."
+            f"{when} raised {type(error).__name__}: {error}. Fix the controller for this state."
         ) from error
     torques: Any = answer.torques if isinstance(answer, Command) else answer
     wrenches = answer.wrenches if isinstance(answer, Command) else None
     try:
-        # Copies: a controller may fill the same array again.
+        # Copies: a controller may reuse its arrays.
         return Command(
-            _own(torques, "what it returned", (n,), "a torque per joint [Nm]"),
+            _copied(torques, "what it returned", (n,), "a torque per joint [Nm]"),
             None
             if wrenches is None
-            else _own(
+            else _copied(
                 wrenches,
                 "the wrenches of the command",
                 observation.wrenches.shape,
@@ -111,9 +111,9 @@ def ask(
         raise ControllerError(f"{when}: {error}") from None
 
 
-def _own(values: Any, what: str, shape: tuple[int, ...], meaning: str) -> np.ndarray:
-    """A finite array of one's own."""
+def _copied(values: Any, what: str, shape: tuple[int, ...], meaning: str) -> np.ndarray:
+    """A copy of a finite array."""
     usual = isinstance(values, np.ndarray) and values.dtype == np.float64
-    if usual and values.shape == shape and np.all(np.isfinite(values)):  # the quick way
+    if usual and values.shape == shape and np.all(np.isfinite(values)):  # the fast path
         return values.copy()
     return finite_array(values, what, shape, meaning).copy()

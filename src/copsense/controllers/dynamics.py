@@ -45,11 +45,10 @@ class StandingDynamics:
         for contact, world, rows in zip(
             stance.contacts, stance.placements, stance.rows, strict=True
         ):
-            frame = robot.frame(contact.frame)
-            place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+            at = contact.on(robot)
             # A point contact's axes are fixed in the world.
             axes = world.rotation.T if contact.kind == "point" else None
-            self._contacts.append((int(frame.parentJoint), place, axes, rows))
+            self._contacts.append((at.joint, at.placement, axes, rows))
         self.update(stance.q, np.zeros(robot.model.nv))
 
     def update(self, q: Float[np.ndarray, " nq"], v: Float[np.ndarray, " nv"]) -> None:

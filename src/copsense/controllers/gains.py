@@ -1,4 +1,4 @@
-"""Gains: how stiff a balancing controller is, as named, documented sets."""
+"""Gains: stiffness and damping of a balancing controller, and two documented sets."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Gains:
     scaled_by_inertia: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse what is no number; unstable gains are the user's to try."""
+        """Validate that all gains are finite; unstable ones are allowed."""
         for name in ("com_stiffness", "com_damping"):
             finite_array(getattr(self, name), f"the gain {name}", (3,), "world x, y, z")
         for name in ("momentum_damping", "momentum_stiffness"):
@@ -61,8 +61,8 @@ class Gains:
                 missing = [joint for joint in robot.torque_names if joint not in value]
                 if missing:
                     raise InvalidInputError(
-                        f"the gain {name} lacks {', '.join(missing)}. Give every joint one, or a "
-                        "number for all."
+                        f"the gain {name} lacks {', '.join(missing)}. Give every joint a gain, "
+                        "or one number for all."
                     )
                 found.append(np.array([float(value[joint]) for joint in robot.torque_names]))
             else:
@@ -78,13 +78,13 @@ _PUBLIC_DAMPING = tuple(2.0 * kp**0.5 / 20.0 for kp in (50.0, 50.0, 10.0))
 
 
 def public_gains(robot: Robot) -> Gains:
-    """Gains like those that the authors published with their iCub controllers.
+    """Gains similar to those that the authors published with their iCub controllers.
 
     Soft, for a robot with friction in its joints: CoM 50, 50, 10 1/s^2 with a twentieth of the
     critical damping per axis, angular momentum 1 1/s and 0.25 1/s^2, posture 10 to 100 Nm/rad.
 
     Args:
-        robot: whose joints are named; legs are stiffer than torso and arms.
+        robot: gives the joints; those of the legs are stiffer than torso and arms.
     """
     stiffness = {}
     for joint in robot.torque_names:

@@ -1,4 +1,4 @@
-"""load_controller: a user's controller by its name, one class or one function."""
+"""load_controller: a user's controller from ``MODULE:ATTRIBUTE``, a class or a function."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from copsense.stance import Stance
 
 
 def controller_code(source: str) -> bytes:
-    """What the module of ``MODULE:ATTRIBUTE`` holds, without running it; nothing if not found."""
+    """The source of the module of ``MODULE:ATTRIBUTE``, without running it; empty if not found."""
     name, folder = _module(source.rpartition(":")[0])
     module = Path(*name.split("."))
     for where in (folder, *map(Path, sys.path)):
@@ -35,18 +35,18 @@ def _module(given: str) -> tuple[str, Path]:
 
 
 def load_controller(source: str, stance: Stance) -> Controller:
-    """A controller from ``MODULE:ATTRIBUTE``, the module found here or installed, or a file's path.
+    """A controller from ``MODULE:ATTRIBUTE``; the module is a name or the path of a file.
 
     Args:
-        source: ``my_module:Mine`` or ``folder/my_module.py:Mine``, a class that is made of the
-            stance, a function whose first parameter is ``stance`` and which returns a controller,
-            or a function observation -> torques.
-        stance: robot, contacts and posture it is to balance.
+        source: ``my_module:Mine`` or ``folder/my_module.py:Mine``: a class called with the stance,
+            a function whose first parameter is ``stance`` and which returns a controller, or a
+            function observation -> torques.
+        stance: robot, contacts and posture to balance.
 
     Raises:
-        InvalidInputError: not of that form, no such module, or nothing that can be called.
+        InvalidInputError: not of that form, no such module, or not callable.
         UnknownNameError: the module has no such attribute.
-        ControllerError: making it failed; the message says with what.
+        ControllerError: it raised when called with the stance; the message says what.
     """
     given, colon, attribute = source.rpartition(":")
     if not (given and colon and attribute):
@@ -62,8 +62,8 @@ def load_controller(source: str, stance: Stance) -> Controller:
     except (Exception, SystemExit) as error:
         raise InvalidInputError(
             f"the controller's module {module_name!r} cannot be imported "
-            f"({type(error).__name__}: {error}). Mend it, run the command in its folder, or "
-            "install it."
+            f"({type(error).__name__}: {error}). Fix it, run the command in its folder, or install "
+            "it."
         ) from error
     made: Any = getattr(module, attribute, None)
     if made is None:
@@ -73,22 +73,22 @@ def load_controller(source: str, stance: Stance) -> Controller:
             if callable(value) and getattr(value, "__module__", "") == module_name
         ]
         raise UnknownNameError(f"controller in {module_name!r}", attribute, public)
-    if _made_of_a_stance(made):
+    if _takes_a_stance(made):
         try:
             made = made(stance)
         except (Exception, SystemExit) as error:
             raise ControllerError(
-                f"{source} raised {type(error).__name__} when made of the stance: {error}. It is "
-                "called with the stance alone."
+                f"{source} raised {type(error).__name__} when called with the stance: {error}. Fix "
+                "it for this stance."
             ) from error
     if not callable(made) or isinstance(made, np.ndarray):
         raise InvalidInputError(
-            f"{source} gives {made!r}, no controller. Give a callable observation -> torques."
+            f"{source} is {made!r}, not a controller. Give a callable observation -> torques."
         )
     return made
 
 
-def _made_of_a_stance(candidate: object) -> bool:
+def _takes_a_stance(candidate: object) -> bool:
     if inspect.isclass(candidate):
         return True
     if not inspect.isfunction(candidate):

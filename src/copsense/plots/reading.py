@@ -8,6 +8,8 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Bool, Float
 
+from copsense.polygon import Polygon, unpadded
+
 ON_EDGE = 1e-9  # m: a CoP this near to its edge is on it
 MM, DEG = 1e3, 180.0 / np.pi
 _AXES = {"x": 0, "y": 1}
@@ -63,36 +65,10 @@ def world_soles(dataset: xr.Dataset) -> list[Float[np.ndarray, "k 2"] | None]:
         return [None] * dataset.sizes["contact"]
     axes = dataset["contact_rotation"].values[:, :2, :2]
     soles: list[np.ndarray | None] = []
-    for k, polygon in enumerate(dataset["sole_polygon"].values):
-        if np.any(np.isnan(polygon)):
-            soles.append(None)
-            continue
-        vertices = polygon[np.r_[True, np.any(np.diff(polygon, axis=0) != 0, axis=1)]]
-        soles.append(contact_origins(dataset)[k] + vertices @ axes[k].T * MM)
+    for k, sole in enumerate(map(unpadded, dataset["sole_polygon"].values)):
+        outline = contact_origins(dataset)[k] + sole.vertices @ axes[k].T * MM if sole else None
+        soles.append(outline)
     return soles
-
-
-def cross_section(
-    sole: Float[np.ndarray, "k 2"], axis: str, at: float
-) -> tuple[float, float] | None:
-    """Where a line along `axis`, the other coordinate being `at`, enters and leaves a sole.
-
-    These two are the edges that a CoP on that line can reach. None where the line misses it.
-    """
-    along = _AXES[axis]
-    across = 1 - along
-    reach = sole[:, across].min(), sole[:, across].max()
-    if reach[1] - reach[0] < 1e-9:  # a sole that is a line
-        return float(sole[:, along].min()), float(sole[:, along].max())
-    if not reach[0] <= at <= reach[1]:
-        return None
-    crossings = []
-    for a, b in zip(sole, np.roll(sole, -1, axis=0), strict=True):
-        low, high = sorted((a[across], b[across]))
-        if low <= at <= high and high > low:
-            part = (at - a[across]) / (b[across] - a[across])
-            crossings.append(a[along] + part * (b[along] - a[along]))
-    return float(min(crossings)), float(max(crossings))
 
 
 def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
@@ -103,7 +79,7 @@ def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
         here = cops[:, :, k]
         known = here[np.isfinite(here)]
         at = float(np.median(known)) if known.size else float(contact_origins(dataset)[k, 0])
-        found.append(None if sole is None else cross_section(sole, axis, at))
+        found.append(None if sole is None else Polygon.hull(sole).section(axis, at))
     return found
 
 

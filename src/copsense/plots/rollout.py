@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.plots.reading import DEG, MM, contact_origins, cross_section, labels, world_soles
+from copsense.plots.reading import DEG, MM, contact_origins, labels, world_soles
 from copsense.plots.soles import draw_ground, draw_track, frame_ground
 from copsense.plots.style import (
     COM_LINE,
@@ -24,6 +24,7 @@ from copsense.plots.style import (
     put_legend,
     styled,
 )
+from copsense.polygon import Polygon, unpadded
 
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
@@ -121,7 +122,11 @@ def _draw_cop(ax: Axes, dataset: xr.Dataset, colour: dict[str, str]) -> None:
     cops, soles = _world_cop(dataset, "cop"), world_soles(dataset)
     for k, (name, c) in enumerate(colour.items()):
         sole, known = soles[k], cops[np.isfinite(cops[:, k, 0]), k, 0]
-        found = None if sole is None else cross_section(sole, "y", float(np.median([*known, 0.0])))
+        found = (
+            None
+            if sole is None
+            else Polygon.hull(sole).section("y", float(np.median([*known, 0.0])))
+        )
         if found:
             ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
             for edge in found:
@@ -225,10 +230,11 @@ def _draw_against(ax: Axes, dataset: xr.Dataset, colour: dict[str, str], joint: 
     for k, (name, c) in enumerate(colour.items()):
         cop = dataset["cop"].values[:, k, 1] * MM
         ax.plot(x[rows], cop[rows], color=c, linewidth=1.3, linestyle=styles[name])
-    edges = _local_edges(dataset, rows)
-    for found, c in zip(edges, colour.values(), strict=False):
-        for edge in found:
+    by_contact = _local_edges(dataset, rows)
+    for name, c in colour.items():
+        for edge in by_contact.get(name, ()):
             ax.axhline(edge, **{**EDGE_LINE, "color": c})
+    edges = list(by_contact.values())
     if edges:
         reach = 1.15 * float(np.abs(edges).max())
         ax.set_ylim(-reach, reach)
@@ -257,14 +263,17 @@ def _draw_loads(
     put_legend(ax, handles)
 
 
-def _local_edges(dataset: xr.Dataset, rows: np.ndarray) -> list[tuple[float, float]]:
+def _local_edges(dataset: xr.Dataset, rows: np.ndarray) -> dict[str, tuple[float, float]]:
     """Where each sole ends to the right and to the left of its CoPs, in its own frame [mm]."""
     if "sole_polygon" not in dataset:
-        return []
-    found = []
-    for k, polygon in enumerate(dataset["sole_polygon"].values):
+        return {}
+    found = {}
+    for k, name in enumerate(labels(dataset, "contact")):
+        sole = unpadded(dataset["sole_polygon"].values[k] * MM)
+        if sole is None:
+            continue
         x = dataset["cop"].values[rows, k, 0]
         middle = float(np.median(x[np.isfinite(x)])) * MM if np.any(np.isfinite(x)) else 0.0
-        across = cross_section(polygon * MM, "y", middle)
-        found.append(across or (polygon[:, 1].min() * MM, polygon[:, 1].max() * MM))
+        whole = float(sole.vertices[:, 1].min()), float(sole.vertices[:, 1].max())
+        found[name] = sole.section("y", middle) or whole
     return found

@@ -47,8 +47,8 @@ def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figu
     origins = np.array([place.translation[:2] for place in places]) * MM
     soles = [
         None
-        if contact.polygon is None or contact.kind == "point"
-        else origins[k] + contact.polygon @ places[k].rotation[:2, :2].T * MM
+        if contact.sole is None
+        else origins[k] + contact.sole.vertices @ places[k].rotation[:2, :2].T * MM
         for k, contact in enumerate(stance.contacts)
     ]
     com = stance.com[:2] * MM

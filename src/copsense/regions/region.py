@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
-from copsense.contact import half_planes
-from copsense.regions.polygon import Points, distance, tidy
+from copsense.polygon import Polygon
+from copsense.regions.refinement import Points
 from copsense.stance import Stance
 
 BOX = 10.0  # m: how far from the stance's CoM a region is followed along x and along y
+MERGE = 1e-8  # m: vertices nearer than this to the line of their neighbours are left out
 _ON = 1e-9  # m: a point this near to a region belongs to it
 
 
@@ -38,19 +40,35 @@ class ComRegion:
 
     def __post_init__(self) -> None:
         """Own the vertices."""
-        polygon = finite_array(self.polygon, "the polygon of a region", (None, 2), "x, y [m]")
-        object.__setattr__(self, "polygon", polygon)
+        object.__setattr__(self, "polygon", self.outline.vertices)
+
+    def __repr__(self) -> str:
+        """Its extent, area and whether it was cut."""
+        if self.empty:
+            return "ComRegion(empty)"
+        (x0, y0), (x1, y1) = self.polygon.min(axis=0), self.polygon.max(axis=0)
+        size = f"{self.area * 1e4:.4g} cm2"
+        if self.area == 0:
+            size = f"{float(np.linalg.norm(self.polygon[-1] - self.polygon[0])) * 1e3:.4g} mm long"
+        return (
+            f"ComRegion({size}, {len(self.polygon)} vertices, x {x0:.4g} to {x1:.4g} m, "
+            f"y {y0:.4g} to {y1:.4g} m{'' if self.bounded else ', cut at the box: without end'})"
+        )
+
+    @cached_property
+    def outline(self) -> Polygon:
+        """The polygon as a figure, with edges and distances."""
+        return Polygon(self.polygon)
 
     @property
     def empty(self) -> bool:
         """Whether no position is in it."""
-        return len(self.polygon) == 0
+        return not self.outline
 
     @property
     def area(self) -> float:
         """Area [m^2]; zero for an interval, a segment, a point or nothing."""
-        x, y = (self.polygon - self.polygon[:1]).T
-        return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+        return self.outline.area
 
     def margin(self, point: ArrayLike) -> float:
         """Signed distance of a horizontal position to the polygon's boundary [m].
@@ -65,12 +83,11 @@ class ComRegion:
         p = finite_array(point, "the point", (2,), "world x, y [m]")
         if self.empty:
             return -np.inf
-        if len(self.polygon) >= 3 or (self.interval and len(self.polygon) == 2):
-            normals, offsets = half_planes(self.polygon)
-            nearest = float(np.min(offsets - normals @ p))
+        if len(self.outline) >= 3 or (self.interval and len(self.outline) == 2):
+            nearest = float(self.outline.margins(p))
             if nearest >= 0 or self.interval:
                 return nearest
-        return -distance(p, self.polygon)
+        return -self.outline.boundary_distance(p)
 
     def contains(self, point: ArrayLike) -> bool:
         """Whether a horizontal position (2,) [m] is in the polygon or within 1e-9 m of it."""
@@ -81,7 +98,7 @@ def region_between(
     stance: Stance, inner: Points, outer: Float[np.ndarray, "l 2"], *, interval: bool
 ) -> ComRegion:
     """A region from its inner polygon, made minimal, and the corners of an outer one."""
-    polygon = tidy(inner)
-    gap = max((distance(corner, polygon) for corner in outer), default=0.0)
-    reach = np.abs(polygon - stance.com[:2]).max(initial=0.0)
-    return ComRegion(polygon, gap, bool(reach < BOX * (1 - 1e-6)), interval)
+    polygon = Polygon.merged(inner, MERGE)
+    gap = max((polygon.boundary_distance(corner) for corner in outer), default=0.0)
+    reach = np.abs(polygon.vertices - stance.com[:2]).max(initial=0.0)
+    return ComRegion(polygon.vertices, gap, bool(reach < BOX * (1 - 1e-6)), interval)

@@ -1,4 +1,4 @@
-"""Actuation: torques as commanded become torques as applied (delay, bandwidth, limits)."""
+"""Actuation: from the commanded torques to those applied (delay, bandwidth, limits)."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from copsense.simulation.disturbance import Motors
 
 
 class Actuation:
-    """The motors of one rollout; the first command is taken to have been there before."""
+    """The motors of one run; before the start, the first command counts as already given."""
 
     def __init__(self, motors: Motors, robot: Robot, time_step: float) -> None:
         """Prepare the delay line.
 
         Raises:
-            InvalidInputError: the delay is no multiple of the time step.
+            InvalidInputError: the delay is not a multiple of the time step.
         """
         ratio = motors.delay / time_step
         self._delay = round(ratio)
         if abs(ratio - self._delay) > 1e-6 * max(ratio, 1.0):
             raise InvalidInputError(
-                f"the motors' delay of {motors.delay:g} s is no multiple of the physics' time step "
-                f"of {time_step:g} s. Give {self._delay * time_step:g} s."
+                f"the motors' delay of {motors.delay:g} s is not a multiple of the physics' time "
+                f"step of {time_step:g} s. Give {self._delay * time_step:g} s."
             )
         self._limits = motors.limits(robot)
         self._limited = bool(np.any(np.isfinite(self._limits)))

@@ -1,4 +1,4 @@
-"""Disturbances: pushes, imperfect motors and noisy sensors, each a value of a scenario."""
+"""Disturbances: pushes, imperfect motors, noisy sensors and other ground, as values."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ class Push:
     frame: str = "root_joint"
 
     def __post_init__(self) -> None:
-        """Refuse what is no push."""
+        """Validate force, start and duration."""
         force = finite_array(self.force, "the force of a push", (3,), "world x, y, z [N]")
         object.__setattr__(self, "force", tuple(float(c) for c in force))
         finite_number(self.duration, "the duration of a push [s]", positive=True)
         if finite_number(self.start, "the start of a push [s]") < 0:
-            raise InvalidInputError(f"a push starts at {self.start} s. Give a time from 0 on.")
+            raise InvalidInputError(f"a push starts at {self.start} s. Give 0 or more.")
 
     @property
     def impulse(self) -> float:
@@ -45,11 +45,11 @@ class Push:
         return float(np.linalg.norm(self.force)) * self.duration
 
     def share(self, time: float, step: float) -> float:
-        """Share of a step from a time on in which it acts: what is given is its whole impulse.
+        """Share of a step during which the push acts, so that the steps add up to its impulse.
 
         Args:
-            time: [s].
-            step: [s].
+            time: when the step begins [s].
+            step: how long it lasts [s].
         """
         end = min(time + step, self.start + self.duration)
         return round(max(0.0, end - max(time, self.start)) / step, 9)
@@ -57,13 +57,13 @@ class Push:
 
 @dataclass(frozen=True)
 class Motors:
-    """Between the torques commanded and those applied.
+    """Imperfect motors, between the commanded torques and those applied.
 
     Attributes:
         delay: [s]; a command takes effect this much later.
         bandwidth: of a first-order low-pass [Hz], or None for immediate torques.
         limit: greatest torque of every joint [Nm], joint -> limit (others unlimited),
-            ``"model"`` for the model's effort limits, or None.
+            ``"model"`` for `Robot.effort_limits`, or None.
     """
 
     delay: float = 0.0
@@ -71,7 +71,7 @@ class Motors:
     limit: float | Mapping[str, float] | str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no motor is."""
+        """Validate delay and bandwidth; limits are validated with the robot."""
         if not 0 <= finite_number(self.delay, "the delay of the motors [s]") <= 1:
             raise InvalidInputError(
                 f"the delay of the motors is {self.delay} s. Give a time from 0 to 1."
@@ -106,7 +106,7 @@ class Motors:
 
 @dataclass(frozen=True)
 class Noise:
-    """Gaussian noise of the sensors; the base is known, or follows from the joints by odometry.
+    """Gaussian noise of the sensors. The base is known exactly, or estimated by odometry.
 
     Attributes:
         position: standard deviation of joint positions [rad, m].
@@ -121,7 +121,7 @@ class Noise:
     moment: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a deviation that is none."""
+        """Validate the standard deviations."""
         for name in ("position", "velocity", "force", "moment"):
             if finite_number(getattr(self, name), f"the {name} noise") < 0:
                 raise InvalidInputError(
@@ -132,12 +132,12 @@ class Noise:
 
 @dataclass(frozen=True)
 class FrictionChange:
-    """The ground becomes slippery, or rougher, at a time.
+    """A new friction of the ground from some time on.
 
     Attributes:
         friction: Coulomb coefficient from then on.
         start: [s].
-        contact: name of the contact whose ground changes; default every one's.
+        contact: name of the contact whose ground changes; default all.
     """
 
     friction: float
@@ -145,23 +145,23 @@ class FrictionChange:
     contact: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no ground is."""
+        """Validate coefficient and start."""
         if finite_number(self.friction, "the friction of the ground") < 0:
             raise InvalidInputError(
                 f"the friction of the ground is {self.friction}. Give a coefficient, 0 or more."
             )
         if finite_number(self.start, "the start of a change of friction [s]") < 0:
             raise InvalidInputError(
-                f"a change of friction starts at {self.start} s. Give a time from 0 on."
+                f"a change of friction starts at {self.start} s. Give 0 or more."
             )
 
 
 @dataclass(frozen=True)
 class ModelError:
-    """How the robot in simulation differs from the model that the controller computes with.
+    """How the simulated robot differs from the model that the controller uses.
 
     Attributes:
-        mass: every link is heavier by this share (negative: lighter), its inertia with it.
+        mass: relative error of every link's mass and inertia; 0.05 is 5 % heavier.
         payload: frame -> point mass fixed at its origin [kg].
     """
 
@@ -169,23 +169,23 @@ class ModelError:
     payload: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse masses that no robot has."""
+        """Validate the masses."""
         if not finite_number(self.mass, "the error of the mass") > -1:
             raise InvalidInputError(
-                f"the error of the mass is {self.mass:g}: nothing would be left. Give more than -1."
+                f"the error of the mass is {self.mass:g}: no mass would be left. Give more than -1."
             )
         for frame, mass in self.payload.items():
             finite_number(mass, f"the payload at {frame!r} [kg]", positive=True)
 
     def __bool__(self) -> bool:
-        """Whether there is any."""
+        """Whether the robot differs at all."""
         return bool(self.mass or self.payload)
 
     def applied(self, stance: Stance) -> Stance:
-        """The stance of the robot as it really is.
+        """The stance of the simulated robot.
 
         Raises:
-            UnknownNameError: a payload hangs on no frame of the robot.
+            UnknownNameError: the robot has no such frame for a payload.
         """
         robot = stance.robot
         for frame in self.payload:

@@ -1,4 +1,4 @@
-"""EventDetector: when a rollout is over, and why."""
+"""EventDetector: when a contact tips, lifts or slips, and when a run is over."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from copsense.stance import Stance
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What counts as the end.
+    """What counts as a tip, a lift, a slip or a fall.
 
     Attributes:
-        tilt: a sole turned by more has tipped [rad].
-        lift: a contact's origin higher above its plane has left it [m].
-        slip: a contact of which a corner (or the point) is farther from its place along the plane
-            has slipped [m].
-        fall: the CoM lower than this share of its height at the start is a fall.
-        base_tilt: so is a base turned by more [rad].
-        speed: a joint faster than this is a motion that has diverged [rad/s, m/s].
+        tilt: a sole that has turned by more than this has tipped [rad].
+        lift: a contact whose origin is higher than this above its plane has lifted [m].
+        slip: a contact with a corner (or the point) farther than this from its place, along the
+            plane, has slipped [m].
+        fall: a CoM lower than this share of its initial height is a fall.
+        base_tilt: a base that has turned by more than this is a fall [rad].
+        speed: a motion with a joint faster than this has diverged [rad/s, m/s].
     """
 
     tilt: float = 0.00873  # 0.5 degrees
@@ -34,21 +34,21 @@ class Thresholds:
     speed: float = 200.0
 
     def __post_init__(self) -> None:
-        """Refuse a threshold that everything or nothing passes."""
+        """Validate the thresholds: each must be positive."""
         for name in ("tilt", "lift", "slip", "fall", "base_tilt", "speed"):
             finite_number(getattr(self, name), f"the threshold {name}", positive=True)
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that may end a rollout.
+    """Something that may end a run.
 
     Attributes:
         kind: ``"tip"``, ``"lift"``, ``"slip"``, ``"fall"``, ``"diverged"``, ``"engine"``,
             ``"controller"`` or ``"stopped"``.
         time: [s].
-        message: what happened, in words.
-        contact: the contact concerned, or nothing.
+        message: what happened, as a sentence.
+        contact: the name of the contact concerned, or empty.
     """
 
     kind: str
@@ -58,19 +58,16 @@ class Event:
 
 
 class EventDetector:
-    """Looks at every snapshot of one rollout."""
+    """Checks every snapshot of one run."""
 
     def __init__(self, stance: Stance, thresholds: Thresholds) -> None:
-        """Remember where everything stands."""
+        """Store where the contacts, the base and the CoM start."""
         self._names, self._limits = stance.contact_names, thresholds
         self._normals = np.array([p.rotation[:, 2] for p in stance.placements])
         self._origins = np.array([p.translation for p in stance.placements])
         self._turns = np.array([c.kind != "point" for c in stance.contacts])
         self._axes = np.array([p.rotation for p in stance.placements])
-        self._corners = [
-            np.zeros((1, 2)) if c.kind == "point" or c.polygon is None else np.array(c.polygon)
-            for c in stance.contacts
-        ]
+        self._corners = [c.sole.vertices if c.sole else np.zeros((1, 2)) for c in stance.contacts]
         self._reach = np.array([np.linalg.norm(c, axis=1).max() for c in self._corners])
         self._ground = float(self._origins[:, 2].mean())
         self._height = float(stance.com[2]) - self._ground
@@ -80,7 +77,7 @@ class EventDetector:
         self._data = self._model.createData()
 
     def contact_event(self, now: Snapshot) -> Event | None:
-        """The first contact that does not stand any more, if any."""
+        """The first contact that has tipped, lifted or slipped, if any."""
         tilts = self.tilts(now)
         lifts = np.einsum("ij,ij->i", now.positions - self._origins, self._normals)
         for k, name in enumerate(self._names):
@@ -102,13 +99,13 @@ class EventDetector:
         return None
 
     def slips(self, now: Snapshot) -> np.ndarray:
-        """How far each contact's farthest corner is from its place along the plane (nc,) [m].
+        """How far each contact's farthest corner has moved along the plane (nc,) [m].
 
-        An upper bound, where even that is under the threshold.
+        For a contact below the threshold this is an upper bound.
         """
         moved = now.positions - self._origins
         heading = np.abs((now.rotations[:, :, 0] * self._axes[:, :, 1]).sum(axis=1))
-        # A chord is at most sqrt(2) times as long as the sine of a turn up to 90 degrees says.
+        # A chord is at most sqrt(2) times the sine of a turn of up to 90 degrees.
         found = np.sqrt((moved * moved).sum(axis=1)) + 1.5 * self._reach * heading
         for k in np.flatnonzero(found > self._limits.slip):
             turned = (now.rotations[k] - self._axes[k])[:, :2] @ self._corners[k].T
@@ -128,7 +125,7 @@ class EventDetector:
         return np.array(pin.centerOfMass(self._model, self._data, now.q))
 
     def end_event(self, now: Snapshot, com_height: float) -> Event | None:
-        """A fall or a divergence, after which nothing more can be learnt."""
+        """A fall or a divergence, which ends a run."""
         fastest = int(np.argmax(np.abs(now.v[6:]))) if len(now.v) > 6 else -1
         speed = float(now.v[6 + fastest]) if fastest >= 0 else 0.0
         if abs(speed) > self._limits.speed:
@@ -136,7 +133,7 @@ class EventDetector:
                 "diverged",
                 now.time,
                 f"the motion diverged: joint {self._joints[fastest]} moves at {speed:.0f} rad/s; "
-                "the gains are unstable, a push was too strong, or a foot has lost the ground",
+                "the gains are unstable, a push was too strong, or a foot has left the ground",
             )
         height = com_height - self._ground
         if height < self._limits.fall * self._height:

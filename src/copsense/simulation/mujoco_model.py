@@ -1,7 +1,7 @@
-"""The MuJoCo model of a stance, written from its Pinocchio model.
+"""The MuJoCo model of a stance, built from its Pinocchio model.
 
-Written rather than read from the robot's file, so that locked joints, replaced inertias and robots
-without a file need no second reading.
+It is not read from the robot's file, so locked joints, replaced inertias and robots without a file
+are simulated as they are analysed.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from copsense.simulation.support_points import support_points
 from copsense.stance import Stance
 
 _POINT = 1e-4  # m: radius of the ball at each support point
-# m: how deep each starts in the ground. A contact that only touches is not felt in the first step,
-# and the torques meant for a foot that is held spin one that is not.
+# m: how deep each ball starts in the ground. A contact that only touches carries no force in the
+# first step, and torques meant for a foot on the ground would spin it.
 _PRESSED = 1e-6
 _HINGES = ("JointModelR",)
 _SLIDES = ("JointModelP",)
@@ -32,7 +32,7 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     robot, model = stance.robot, stance.robot.model
     if model.joints[1].shortname() != "JointModelFreeFlyer":
         raise InvalidInputError(
-            f"robot {robot.name!r} lives in a plane: a simulation is spatial. Use a robot with a "
+            f"robot {robot.name!r} moves in a plane, the simulation in space. Use a robot with a "
             "free-floating base."
         )
     spec = mujoco.MjSpec()
@@ -42,7 +42,7 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio, option.tolerance, option.iterations = settings.impedance_ratio, 1e-10, 100
-    # A fall must not start over in silence.
+    # Without this flag a fall restarts the simulation without an error.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     bodies = {0: spec.worldbody}
     for i in range(1, model.njoints):
@@ -59,7 +59,7 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     try:
         return spec.compile()
     except ValueError as error:
-        # Its remedies are options of MuJoCo's own files.
+        # MuJoCo's remedies are options of its own file format.
         reason, _, where = str(error).strip().removeprefix("Error: ").partition("\n")
         named = re.search(r"'body (.+)'", where)
         link = f" of the link behind joint {named[1]!r}" if named else ""
@@ -70,7 +70,7 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
 
 
 def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
-    """The body behind a joint of the model, with that joint."""
+    """Add the body moved by a joint of the model, and the joint."""
     model = robot.model
     place, inertia, joint = model.jointPlacements[i], model.inertias[i], model.joints[i]
     body = parent.add_body(name=f"body {model.names[i]}", pos=place.translation, quat=_wxyz(place))
@@ -112,10 +112,9 @@ def _add_contact(
     world: pin.SE3,
     settings: PhysicsSettings,
 ) -> None:
-    """A contact's frame, its support points and the plane that they stand on."""
-    frame = robot.frame(contact.frame)
-    body = bodies[frame.parentJoint]
-    place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
+    """Add a contact's frame, its support points and the plane below them."""
+    at = contact.on(robot)
+    body, place = bodies[at.joint], at.placement
     body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=_wxyz(place))
     up = world.rotation[:, 2]
     point = contact.kind == "point"
@@ -123,7 +122,7 @@ def _add_contact(
         name=f"plane under {contact.name}",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[0.0, 0.0, 1.0],
-        # A point's ball is centred on the point; a sole's balls stand on the sole.
+        # A point's ball is centred on the point; a sole's balls touch the sole from above.
         pos=world.translation + (_PRESSED - (_POINT if point else 0.0)) * up,
         quat=_wxyz(world),
         contype=0,

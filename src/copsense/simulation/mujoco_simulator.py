@@ -1,7 +1,7 @@
-"""MujocoSimulator: MuJoCo, built from the robot and the contacts that the analysis uses.
+"""MujocoSimulator: a stance in MuJoCo, with the robot and contacts that the analysis uses.
 
-The only module that knows MuJoCo. Mass matrix, bias forces and centre of mass of both engines are
-compared before anything moves.
+`load_mujoco` imports the package for everything in `copsense.simulation`. Before the first step,
+mass matrix, bias forces and centre of mass are compared with Pinocchio's.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ _AGREEMENT = 1e-8  # of mass matrix, bias and CoM, relative to their size
 
 
 class MujocoSimulator:
-    """A stance in MuJoCo: torque-controlled joints, soles on rigid planes.
+    """A stance in MuJoCo: torque-controlled joints, soles on planes.
 
-    Every support point of a contact may touch the plane of its own contact and nothing else; the
-    rest of the robot passes through the ground, which a fall ends anyway.
+    The support points of a contact touch the plane of that contact and nothing else. The rest of
+    the robot passes through the ground; a run ends with the fall before that matters.
 
     Args:
         stance: robot, start configuration and contacts.
         settings: time step and contact model.
         wrenches: how contact wrenches are measured: ``"contacts"`` sums the engine's contact
             forces; ``"sensors"`` reads a six-axis sensor between each foot and the joint above it
-            and adds the foot's weight, as a robot does.
+            and adds the foot's weight, as on a real robot.
 
     Raises:
         MissingExtraError: mujoco is not installed.
-        InvalidInputError: a robot or contact that cannot be simulated.
-        EngineMismatchError: MuJoCo sees another robot than Pinocchio.
+        InvalidInputError: the robot or a contact cannot be simulated.
+        EngineMismatchError: MuJoCo's model of the robot differs from Pinocchio's.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class MujocoSimulator:
         still = np.zeros(self._stance.robot.model.nv)
         self._move(self._stance.q, still if velocity is None else velocity)
         self._mujoco.mj_forward(self._model, self._data)
-        # No solution to start from: the same start gives the same run.
+        # Without a warm start the same start gives the same run.
         self._data.qacc_warmstart[:] = 0.0
         return self._snapshot(measured=False)
 
@@ -114,9 +114,9 @@ class MujocoSimulator:
         torques: Float[np.ndarray, " n"],
         external: Float[np.ndarray, " nv"] | None = None,
     ) -> Snapshot:
-        """Go on by one time step; see `Simulator.step`."""
+        """Advance by one time step; see `Simulator.step`."""
         data, before = self._data, float(self._data.time)
-        # Motors and pushes enter as generalised forces: no gears, ranges or names between.
+        # Motors and pushes are generalised forces, without MuJoCo's gears and ranges.
         data.qfrc_applied[self._columns[6:]] = torques
         data.qfrc_applied[:6] = 0.0
         if external is not None:
@@ -125,17 +125,17 @@ class MujocoSimulator:
             data.qfrc_applied[3:6] = external[3:6]
             data.qfrc_applied[self._columns[6:]] += external[6:]
         shown = self._mujoco.get_mju_user_warning()
-        self._mujoco.set_mju_user_warning(_quiet)  # it would write a log file where we stand
+        self._mujoco.set_mju_user_warning(_quiet)  # else it writes a log file here
         self._mujoco.mj_step(self._model, data)
         self._mujoco.set_mju_user_warning(shown)
         warned = [w for w in _FATAL if data.warning[getattr(self._mujoco.mjtWarning, w)].number]
         if warned or not data.time > before:
             raise SimulatorStoppedError(
-                f"MuJoCo gave up ({', '.join(warned) or 'it started over'}): the motion diverged",
+                f"MuJoCo stopped ({', '.join(warned) or 'it reset itself'}): the motion diverged",
                 before,
             )
         if not (np.all(np.isfinite(data.qpos)) and np.all(np.isfinite(data.qvel))):
-            raise SimulatorStoppedError("the motion is not finite any more", before)
+            raise SimulatorStoppedError("the motion is no longer finite", before)
         return self._snapshot(measured=True)
 
     def set_friction(self, friction: float, contact: str | None = None) -> None:
@@ -146,14 +146,14 @@ class MujocoSimulator:
         self._model.pair_friction[chosen, :2] = friction
 
     def altered(self, stance: Stance) -> MujocoSimulator:
-        """The same simulator of another robot on the same contacts."""
+        """The same simulator with another robot on the same contacts."""
         return MujocoSimulator(stance, self.settings, wrenches=self._source)
 
     def _move(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Pinocchio's configuration and velocity into MuJoCo's."""
+        """Write a configuration and velocity of Pinocchio into MuJoCo's state."""
         x, y, z, w = q[3:7]
         self._data.qpos[:7] = [*q[:3], w, x, y, z]
-        # A continuous joint is (cos, sin) there and an angle here.
+        # A continuous joint is (cos, sin) in Pinocchio and an angle in MuJoCo.
         self._data.qpos[self._positions] = [
             np.arctan2(q[i + 1], q[i]) if round_ else q[i] for i, round_ in self._circles
         ]
@@ -198,16 +198,19 @@ class MujocoSimulator:
         if self._fixed_axes:
             rotations = rotations.copy()
         for k, axes in self._fixed_axes.items():
-            rotations[k], moments[k] = axes, 0.0  # a point has no moment but its radius's
+            rotations[k], moments[k] = (
+                axes,
+                0.0,
+            )  # the only moment of a point is that of its ball's radius
         turned = np.stack([forces, moments], axis=1) @ rotations
         return np.asarray(turned.reshape(len(self._sites), 6))
 
     def _sensed(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
-        """What six-axis sensors over the feet tell of the contacts: their reading and the weight.
+        """Contact wrenches from six-axis sensors above the feet: reading plus foot's weight.
 
-        Exact at rest; in motion the foot's own acceleration is missing, as on a robot.
+        Exact at rest; in motion the foot's own acceleration is missing, as on a real robot.
         """
-        # The sensor reads what the link above does to the foot, about the contact frame.
+        # The sensor measures the wrench of the link above on the foot, about the contact frame.
         wrenches = -self._data.sensordata.reshape(len(self._feet), 6)
         gravity = self._stance.robot.model.gravity.linear
         for k, (mass, lever) in enumerate(self._feet):
@@ -220,7 +223,7 @@ class MujocoSimulator:
         return wrenches
 
     def _compare(self) -> None:
-        """Compare the engines at the start and at a posture and motion nearby."""
+        """Compare both engines at the start, and at a nearby posture in motion."""
         robot, random = self._stance.robot, np.random.default_rng(0)
         model, zero = robot.model, np.zeros(robot.model.nv)
         for size in (0.0, 0.3):
@@ -251,7 +254,7 @@ class MujocoSimulator:
                     raise EngineMismatchError(
                         f"MuJoCo and Pinocchio disagree on the {what} of {robot.name!r}, "
                         f"relatively by {off:.1e}. A joint or an inertia of this robot is not "
-                        "supported; simplify its description."
+                        "supported. Simplify the robot's description."
                     )
 
 
@@ -260,19 +263,19 @@ _FATAL = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL"
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Rows of a x b; NumPy's own costs more than the rest of a step."""
+    """Rows of a x b; np.cross would take longer than the rest of a step."""
     x, y, z = a.T
     u, v, w = b.T
     return np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def _quiet(message: str) -> None:
-    """Warnings are read from the engine's counters."""
+    """Ignore a warning: `step` reads the engine's counters instead."""
 
 
 def load_mujoco() -> Any:
-    """The engine's package, an extra."""
-    # How it will draw off-screen is settled when it is first imported.
+    """The package mujoco, which the extra `sim` installs."""
+    # MuJoCo chooses how to draw off-screen when it is first imported.
     screen = {"DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"} & set(os.environ)
     if sys.platform == "linux" and not screen and find_library("EGL"):
         os.environ["MUJOCO_GL"] = "egl"
@@ -280,7 +283,7 @@ def load_mujoco() -> Any:
         import mujoco
     except ImportError:
         raise MissingExtraError("mujoco", "sim", "simulating a robot") from None
-    except RuntimeError as error:  # it refuses values of MUJOCO_GL
+    except RuntimeError as error:  # MUJOCO_GL has an invalid value
         raise InvalidInputError(
             f"MuJoCo does not load: {error}. Leave the variable MUJOCO_GL out, or give egl, osmesa "
             "or glfw."
@@ -289,7 +292,7 @@ def load_mujoco() -> Any:
 
 
 def _circles(robot: Robot) -> list[tuple[int, bool]]:
-    """Where each joint stands in a configuration, and whether it is stored as (cos, sin)."""
+    """Each joint's index in a configuration, and whether it is stored as (cos, sin)."""
     return [(joint.idx_q, joint.nq == 2) for joint in list(robot.model.joints)[2:]]
 
 
@@ -297,14 +300,13 @@ def _feet(stance: Stance) -> tuple[tuple[float, np.ndarray], ...]:
     """Mass of the link of each contact, and its centre in the contact frame [m]."""
     robot, found, links = stance.robot, [], set()
     for contact in stance.contacts:
-        frame = robot.frame(contact.frame)
-        if frame.parentJoint in links or frame.parentJoint < 2:
+        at = contact.on(robot)
+        if at.joint in links or at.joint < 2:
             raise InvalidInputError(
                 f"contact {contact.name!r} shares its link with another contact, or is on the "
                 'base: a sensor cannot tell them apart. Measure wrenches from "contacts".'
             )
-        links.add(frame.parentJoint)
-        place = frame.placement * pin.SE3(contact.rotation, np.array(contact.offset))
-        inertia = robot.model.inertias[frame.parentJoint]
-        found.append((float(inertia.mass), place.actInv(inertia.lever)))
+        links.add(at.joint)
+        inertia = robot.model.inertias[at.joint]
+        found.append((float(inertia.mass), at.placement.actInv(inertia.lever)))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""FootOdometry: the base's state from the joints alone, by taking a foot to stand still."""
+"""FootOdometry: the base's state from the joints alone, assuming that a foot stands still."""
 
 from __future__ import annotations
 
@@ -9,34 +9,34 @@ from jaxtyping import Float
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
-LOADED = "loaded"  # the foot that carries most
+LOADED = "loaded"  # the foot that carries the most
 _HYSTERESIS = 0.1  # of the weight
 
 
 class FootOdometry:
     """Base pose and velocity under the assumption that a foot does not move.
 
-    What a robot without a tracker of its base does. Where that foot tips or slips, the estimate
-    goes with it. With ``"loaded"`` the foot is the one that carries most, by measured normal force;
-    another takes over when it carries more by a tenth of the weight, so that noise does not hand
-    over at every step, and is taken to stand where the last estimate left it.
+    A robot without a tracker of its base estimates it so. When the foot tips or slips, the estimate
+    moves with it. With ``"loaded"`` the foot is the one with the largest measured normal force.
+    Another foot takes over when it carries more by a tenth of the weight, so that noise does not
+    switch feet at every step; it then counts as standing where the last estimate placed it.
 
     Args:
-        stance: robot and contacts; the feet stand where they do here.
+        stance: robot and contacts; where the feet stand.
         contact: name of a surface contact, or ``"loaded"``.
 
     Raises:
         UnknownNameError: no such contact.
-        InvalidInputError: a point contact, which says nothing about the base's orientation.
+        InvalidInputError: only point contacts, from which no orientation follows.
     """
 
     def __init__(self, stance: Stance, contact: str) -> None:
-        """Look up the feet."""
+        """Find the feet on the robot."""
         names = [c.name for c in stance.contacts if c.kind == "surface"]
         if not names:
             raise InvalidInputError(
-                "odometry needs a foot with a sole: a point contact says nothing about the base's "
-                "orientation. Leave odometry out."
+                "odometry needs a foot with a sole: the base's orientation does not follow from a "
+                "point contact. Leave odometry out."
             )
         if contact not in (LOADED, *names):
             raise UnknownNameError("foot for odometry", contact, (LOADED, *names))
@@ -46,10 +46,8 @@ class FootOdometry:
         self._model, self._data = stance.robot.model, stance.robot.model.createData()
         self._feet = []
         for k in surface:
-            c = stance.contacts[k]
-            frame = stance.robot.frame(c.frame)
-            place = frame.placement * pin.SE3(c.rotation, np.array(c.offset))
-            self._feet.append((int(frame.parentJoint), place))
+            at = stance.contacts[k].on(stance.robot)
+            self._feet.append((at.joint, at.placement))
         self._foot = 0 if self._fixed is None else self._fixed
         self._weight = stance.robot.weight
 
@@ -59,7 +57,7 @@ class FootOdometry:
         v: Float[np.ndarray, " nv"],
         wrenches: Float[np.ndarray, "nc 6"],
     ) -> tuple[Float[np.ndarray, " nq"], Float[np.ndarray, " nv"]]:
-        """Configuration and velocity with the base's part estimated; that of `q`, `v` is unread."""
+        """Configuration and velocity with an estimated base; that in `q` and `v` is not used."""
         model, data = self._model, self._data
         q, v = q.copy(), v.copy()
         q[:7], v[:6] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 0.0
@@ -77,6 +75,6 @@ class FootOdometry:
         q[:3], q[3:7] = base.translation, pin.Quaternion(base.rotation).normalized().coeffs()
         joint, place = self._feet[foot]
         J = pin.getFrameJacobian(model, data, joint, place, pin.ReferenceFrame.LOCAL)
-        # The foot stands: J_b v_b + J_j v_j = 0.
+        # The foot stands still: J_b v_b + J_j v_j = 0.
         v[:6] = np.linalg.solve(J[:, :6], -J[:, 6:] @ v[6:])
         return q, v

@@ -1,4 +1,4 @@
-"""PhysicsSettings: how an engine models contacts, fit for a study of centres of pressure."""
+"""PhysicsSettings: time step and contact model, chosen for studies of centres of pressure."""
 
 from __future__ import annotations
 
@@ -12,16 +12,18 @@ from copsense.errors import InvalidInputError
 class PhysicsSettings:
     """Time step and contact model.
 
-    An engine's usual settings are wrong for centres of pressure: MuJoCo's let a sole of the iCub
-    sink 0.57 mm, roll 0.29 degrees and creep 0.28 mm/s. With these it sinks 0.02 mm.
+    An engine's default contacts are too soft for centres of pressure: on MuJoCo's, a sole of the
+    iCub sinks 0.57 mm, rolls 0.29 degrees and creeps 0.28 mm/s. With these settings it sinks
+    0.02 mm.
 
     Attributes:
         time_step: of the physics [s].
         contact_time: time constant of the contact's restoring force [s], at least two time steps.
-        impedance_ratio: how much stiffer friction is than the normal direction; 100 where a slow
+            The larger, the softer is the contact, and the earlier a sole with round edges rolls.
+        impedance_ratio: stiffness of friction relative to the normal direction; use 100 where slow
             creep of the feet matters.
-        friction: Coulomb coefficient of contacts that give none.
-        sole_detail: a sole's vertices are left out while its outline moves by less than this [m].
+        friction: Coulomb coefficient of contacts without one of their own.
+        sole_detail: vertices of a sole are left out as long as its outline moves by less [m].
     """
 
     time_step: float = 1e-3
@@ -31,13 +33,13 @@ class PhysicsSettings:
     sole_detail: float = 2e-4
 
     def __post_init__(self) -> None:
-        """Refuse settings that no simulation can have."""
+        """Validate the settings."""
         for name in ("time_step", "contact_time", "impedance_ratio", "friction"):
             finite_number(getattr(self, name), f"the physics setting {name}", positive=True)
         if self.contact_time < 2 * self.time_step:
             raise InvalidInputError(
                 f"contact_time {self.contact_time:g} s is less than two time steps of "
-                f"{self.time_step:g} s, which no contact survives. Make the time step shorter."
+                f"{self.time_step:g} s, so contacts would be unstable. Give a shorter time step."
             )
         if not 0 <= self.sole_detail <= 1e-2:
             raise InvalidInputError(

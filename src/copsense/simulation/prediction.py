@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from jaxtyping import Float
 
-from copsense.contact import Contact, half_planes
+from copsense.contact import Contact
 from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
@@ -162,8 +162,5 @@ def force_gaps(
 
 def _edge_distances(stance: Stance, cops: np.ndarray, k: int) -> np.ndarray:
     """Distance of CoPs (N, 2) to each edge of a contact's sole (N, e); none for a point."""
-    contact = stance.contacts[k]
-    if contact.polygon is None or contact.kind == "point":
-        return np.full((len(cops), 1), np.inf)
-    normals, offsets = half_planes(contact.polygon)
-    return np.asarray(offsets - cops @ normals.T)
+    sole = stance.contacts[k].sole
+    return sole.distances(cops) if sole else np.full((len(cops), 1), np.inf)

@@ -9,9 +9,10 @@ import pinocchio as pin
 import xarray as xr
 
 from copsense._version import __version__
-from copsense.contact import COMPONENT_NAMES, half_planes
+from copsense.contact import COMPONENT_NAMES
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
+from copsense.polygon import padded
 from copsense.simulation.events import Event
 from copsense.simulation.simulator import Snapshot
 from copsense.stance import Stance
@@ -158,9 +159,8 @@ def _cops(stance: Stance, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     cops = np.stack([-wrenches[:, :, 4] / fz, wrenches[:, :, 3] / fz], axis=2)
     margins = np.full(cops.shape[:2], np.nan)
     for k, contact in enumerate(stance.contacts):
-        if contact.kind != "point" and contact.polygon is not None:
-            normals, offsets = half_planes(contact.polygon)
-            margins[:, k] = (offsets - cops[:, k] @ normals.T).min(axis=1)
+        if contact.sole:
+            margins[:, k] = contact.sole.margins(cops[:, k])
     return cops, margins
 
 
@@ -179,12 +179,14 @@ def _ground(stance: Stance) -> dict[str, Any]:
             {"units": "1", "long_name": "columns: contact axes in world axes"},
         ),
     }
-    polygons = [c.polygon for c in stance.contacts if c.polygon is not None]
-    if len(polygons) == len(stance.contacts):
-        most = max(len(p) for p in polygons)
+    soles = [c.sole for c in stance.contacts]
+    if any(soles):
         found["sole_polygon"] = (
             ("contact", "vertex", "axis"),
-            np.array([np.vstack([p, np.repeat(p[-1:], most - len(p), axis=0)]) for p in polygons]),
-            {"units": "m", "long_name": "vertices of the sole, contact axes, last one repeated"},
+            padded(soles),
+            {
+                "units": "m",
+                "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",
+            },
         )
     return found

@@ -1,4 +1,4 @@
-"""Scenario: everything that happens to a robot in a rollout, as one value."""
+"""Scenario: what a robot does in a run and what disturbs it, as one value."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LONGEST = 3600.0  # s
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What the robot is asked to do and what disturbs it.
+    """What the robot has to do and what disturbs it.
 
     Attributes:
         duration: [s].
@@ -25,14 +25,14 @@ class Scenario:
         pushes: forces on links.
         motors: delay, bandwidth and limits of the torques.
         noise: of the sensors.
-        friction: changes of the ground's friction, in time's order.
-        model_error: how the robot in simulation differs from the controller's model.
-        odometry: the foot that the base's state is estimated from, see `FootOdometry`; None for
+        friction: changes of the ground's friction, sorted by time.
+        model_error: how the simulated robot differs from the controller's model.
+        odometry: the foot from which the base's state is estimated, see `FootOdometry`; None for
             the true state.
         control_period: time between two calls of the controller [s], a multiple of the physics'
             time step.
         seed: of everything random.
-        name: how it is called in results.
+        name: what results call it.
     """
 
     duration: float = 1.0
@@ -48,13 +48,13 @@ class Scenario:
     name: str = "scenario"
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be run."""
+        """Validate the parts that do not depend on the robot."""
         finite_number(self.duration, "the duration of a scenario [s]", positive=True)
         finite_number(self.control_period, "the control period [s]", positive=True)
         object.__setattr__(self, "seed", whole_number(self.seed, "the seed", least=0))
         if self.duration > _LONGEST:
             raise InvalidInputError(
-                f"a scenario of {self.duration:g} s cannot be run. Give at most {_LONGEST:g} s."
+                f"a scenario of {self.duration:g} s is too long. Give at most {_LONGEST:g} s."
             )
         pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
         object.__setattr__(self, "pushes", pushes)
@@ -65,12 +65,12 @@ class Scenario:
             for event in events:
                 if event.start >= self.duration:
                     raise InvalidInputError(
-                        f"a {what} starts at {event.start:g} s, when the scenario of "
-                        f"{self.duration:g} s is over. Make it longer, or begin sooner."
+                        f"a {what} starts at {event.start:g} s, after the end of the scenario at "
+                        f"{self.duration:g} s. Make the scenario longer, or start sooner."
                     )
         if not hasattr(self.reference, "at"):
             raise InvalidInputError(
-                f"the reference {self.reference!r} is none. Give Hold(), Sine(amplitude, "
+                f"{self.reference!r} is not a reference. Give Hold(), Sine(amplitude, "
                 "frequency), Ramp(distance) or a PathReference."
             )
 
@@ -78,23 +78,40 @@ class Scenario:
         """Physics steps between two calls of the controller.
 
         Raises:
-            InvalidInputError: the control period is no multiple of the time step.
+            InvalidInputError: the control period is not a multiple of the time step.
         """
         ratio = self.control_period / time_step
         steps = round(ratio)
         if steps < 1 or abs(ratio - steps) > 1e-6 * ratio:
             raise InvalidInputError(
-                f"the control period of {self.control_period:g} s is no multiple of the physics' "
-                f"time step of {time_step:g} s. Give {max(steps, 1) * time_step:g} s, or change "
-                "the time step."
+                f"the control period of {self.control_period:g} s is not a multiple of the "
+                f"physics' time step of {time_step:g} s. Give {max(steps, 1) * time_step:g} s, or "
+                "change the time step."
             )
         return steps
 
+    def friction_at_start(self, stance: Stance, usual: float) -> dict[str, float]:
+        """Coulomb coefficient of the ground under each contact when the scenario starts.
+
+        A change of friction at time zero replaces a contact's own coefficient, as it does in the
+        simulation.
+
+        Args:
+            stance: gives the contacts, by whose names the coefficients are returned.
+            usual: coefficient of contacts without one of their own, `PhysicsSettings.friction`.
+        """
+        found = {c.name: usual if c.friction is None else c.friction for c in stance.contacts}
+        for change in self.friction:
+            if change.start <= 0:
+                names = found if change.contact is None else [change.contact]
+                found |= dict.fromkeys(names, change.friction)
+        return found
+
     def check_stance(self, stance: Stance) -> None:
-        """Refuse a scenario for joints, frames or contacts that the robot on its feet lacks.
+        """Reject joints, frames and contacts that the robot does not have.
 
         Raises:
-            UnknownNameError: the message names the missing one and those there are.
+            UnknownNameError: no such joint, frame or contact; the message lists the valid names.
         """
         robot = stance.robot
         self.motors.limits(robot)

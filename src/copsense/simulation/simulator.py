@@ -1,4 +1,4 @@
-"""Simulator: what a rollout needs of a physics engine, small enough to be faked in a test."""
+"""Simulator: what a closed loop needs of a physics engine; small, so that tests can fake it."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ from copsense.stance import Stance
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A robot in motion, in the analysis's conventions.
+    """The state of a robot in motion, in the analysis's conventions.
 
     Attributes:
         time: since the last reset [s].
         q: configuration (nq,): base position, quaternion (x, y, z, w), joints.
         v: velocity (nv,): the base in its own frame, then the joints.
         wrenches: wrench of the environment on the robot at each contact (nc, 6), contact axes,
-            about the contact frame's origin [N, Nm], during the step that led here; zero after a
-            reset.
+            about the contact frame's origin [N, Nm], during the last step; zero after a reset.
         positions: origin of each contact frame (nc, 3), world [m].
         rotations: axes of each contact frame as columns (nc, 3, 3), world; they turn with the
-            foot, for point contacts too.
+            foot, also for point contacts.
     """
 
     time: float
@@ -37,19 +36,19 @@ class Snapshot:
 
 
 class SimulatorStoppedError(CopsenseError):
-    """The engine cannot go on: a number is not finite, or it would start over by itself.
+    """The engine cannot continue: a number is not finite, or the engine would reset itself.
 
     Attributes:
-        time: of the last sound state [s].
+        time: of the last valid state [s].
     """
 
     def __init__(self, reason: str, time: float) -> None:
-        """Store the time beside the reason."""
+        """Store reason and time."""
         self.reason, self.time = reason, time
         super().__init__(f"{reason}, at {time:.3f} s")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles are built from the data, not from the message."""
+        """Rebuild copies and pickles from the data, not from the message."""
         return type(self), (self.reason, self.time)
 
 
@@ -74,7 +73,7 @@ class Simulator(Protocol):
         """Put the robot at the stance's configuration, time zero.
 
         Args:
-            velocity: what it moves with (nv,); None at rest.
+            velocity: initial velocity (nv,); None for rest.
         """
 
     def step(
@@ -82,24 +81,24 @@ class Simulator(Protocol):
         torques: Float[np.ndarray, " n"],
         external: Float[np.ndarray, " nv"] | None = None,
     ) -> Snapshot:
-        """Go on by one time step.
+        """Advance by one time step.
 
         Args:
             torques: joint torques (n,) in the robot's order [Nm, N], held during the step.
-            external: generalised force of everything but motors and contacts (nv,), in the axes
-                of the velocity [N, Nm].
+            external: generalised force other than of motors and contacts (nv,), in the axes of
+                the velocity [N, Nm].
 
         Raises:
-            SimulatorStoppedError: the motion is not finite any more.
+            SimulatorStoppedError: the motion is no longer finite.
         """
 
 
 @runtime_checkable
 class AlterableSimulator(Simulator, Protocol):
-    """A simulator whose ground and robot may differ from what the controller believes."""
+    """A simulator whose ground and robot may differ from the controller's model."""
 
     def set_friction(self, friction: float, contact: str | None = None) -> None:
         """Change the ground's friction, under one contact or all, until the next reset."""
 
     def altered(self, stance: Stance) -> Simulator:
-        """The same simulator of another robot on the same contacts."""
+        """The same simulator with another robot on the same contacts."""

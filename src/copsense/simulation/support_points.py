@@ -1,36 +1,39 @@
-"""Supports: the points of a contact that meet the ground in a physics engine."""
+"""Support points: where a contact touches the ground in a physics engine."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
 
-from copsense.contact import Contact, half_planes
+from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.polygon import Polygon
 
 
 def support_points(contact: Contact, detail: float) -> Float[np.ndarray, "k 2"]:
-    """Points of a contact's plane, in the contact frame [m], that carry its wrench.
+    """Points (k, 2) in the plane of a contact that carry its wrench, contact frame [m].
 
-    The vertices of the sole's polygon, whose hull is the sole; a point contact is its origin.
-    Vertices are left out, the least first, while none is more than `detail` [m] off the outline.
+    They are vertices of the sole's polygon; a point contact has its origin alone. The vertices that
+    stand out least are left out first, as long as all of them stay within `detail` [m] of the
+    outline.
 
     Raises:
-        InvalidInputError: a surface contact without polygon, or a planar one.
+        InvalidInputError: a surface contact without a polygon, or a planar contact.
     """
     if contact.kind == "point":
         return np.zeros((1, 2))
     if contact.kind == "planar":
         raise InvalidInputError(
-            f"contact {contact.name!r} is planar: a simulation is spatial. Use surface or point "
+            f"contact {contact.name!r} is planar, the simulation is spatial. Use surface or point "
             "contacts."
         )
-    if contact.polygon is None or len(contact.polygon) < 3:
+    sole = contact.sole
+    if sole is None or len(sole) < 3:
         raise InvalidInputError(
-            f"contact {contact.name!r} has no sole, so nothing that could stand on the ground. "
+            f"contact {contact.name!r} has no sole to stand on. "
             "Give Contact(..., polygon=rectangle(...)) (--sole X0:X1:Y0:Y1)."
         )
-    polygon, kept = contact.polygon, list(contact.polygon)
+    kept = list(sole.vertices)
     while len(kept) > 3:
         # How far each vertex stands out of the line through its neighbours.
         corners = np.array(kept)
@@ -39,8 +42,7 @@ def support_points(contact: Contact, detail: float) -> Float[np.ndarray, "k 2"]:
         rest = corners - before
         least = int(np.argmin(np.abs(along[:, 0] * rest[:, 1] - along[:, 1] * rest[:, 0])))
         fewer = np.delete(corners, least, axis=0)
-        normals, offsets = half_planes(fewer)
-        if (polygon @ normals.T - offsets).max() > detail:
+        if -Polygon(fewer).margins(sole.vertices).min() > detail:
             break
         kept.pop(least)
     return np.array(kept)

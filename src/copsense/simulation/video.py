@@ -1,7 +1,7 @@
 """write_video: a recording as a film, drawn off-screen by MuJoCo.
 
-The only module that knows the encoder. Links are drawn as capsules between joints, soles as their
-polygons' corners, centres of pressure and of mass as balls.
+The only module that imports the video encoder. Links are drawn as capsules between joints, soles as
+outlines, centres of pressure and of mass as balls.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def write_video(
 
     Args:
         stance: the robot and its contacts.
-        recording: what `rollout` returned.
+        recording: of a closed loop.
         path: where to write, ``.mp4``.
         overwrite: whether a file there may be replaced.
         progress: called with 1 after each frame.
@@ -52,7 +52,7 @@ def write_video(
     Raises:
         MissingExtraError: MuJoCo or the encoder is not installed.
         OutputError: the file cannot be written, or this machine cannot draw off-screen.
-        InvalidInputError: a recording of another robot.
+        InvalidInputError: the recording is of another robot.
     """
     path = check_output(path, suffixes=(".mp4",), overwrite=overwrite)
     encode = _encoder()
@@ -82,7 +82,7 @@ def write_video(
 
 
 def check_video() -> None:
-    """Refuse at once what could not be filmed.
+    """Raise where this machine cannot film.
 
     Raises:
         MissingExtraError: MuJoCo or the encoder is not installed.
@@ -138,7 +138,7 @@ def _renderer(model: Any) -> Iterator[Any]:
             "this machine cannot draw off-screen "
             f"({type(error).__name__}: {str(error).splitlines()[0] if str(error) else 'no GL'}; "
             f"MUJOCO_GL={os.environ.get('MUJOCO_GL', 'unset')}). Install EGL (libegl1, "
-            "libgl1-mesa-dri) and set MUJOCO_GL=egl before Python starts, or leave the video out."
+            "libgl1-mesa-dri) and set MUJOCO_GL=egl before Python starts, or leave out the video."
         ) from None
     try:
         yield renderer
@@ -173,13 +173,12 @@ def _screen(stance: Stance) -> Iterator[Callable[[xr.Dataset, int], np.ndarray]]
                 if np.linalg.norm(end - start) > radius / 4:
                     _capsule(mujoco, scene, start, end, radius, _LINK)
             for k, contact in enumerate(stance.contacts):
-                frame = stance.robot.frame(contact.frame)
-                place = data.oMi[frame.parentJoint] * frame.placement
-                place = place * pin.SE3(contact.rotation, np.array(contact.offset))
-                ankle = data.oMi[frame.parentJoint].translation
+                at = contact.on(stance.robot)
+                place = data.oMi[at.joint] * at.placement
+                ankle = data.oMi[at.joint].translation
                 _capsule(mujoco, scene, ankle, place.translation, 0.7 * radius, _LINK)
-                if contact.polygon is not None and contact.kind != "point":
-                    corners = [place.act(np.array([*p, 0.0])) for p in contact.polygon]
+                if contact.sole:
+                    corners = [place.act(np.array([*p, 0.0])) for p in contact.sole.vertices]
                     for p, q in zip(corners, [*corners[1:], corners[0]], strict=True):
                         _capsule(mujoco, scene, p, q, 0.15 * radius, _FOOT)
                 cop = recording["cop"].values[row, k]

@@ -253,7 +253,7 @@ class _Problem:
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
         # Row of the normal force under a centre of pressure; -1 for any other limit.
         under = [
-            stance.rows[k].start + stance.contacts[k].components.index(2) if kind == "cop" else -1
+            stance.rows[k].start + stance.contacts[k].normal_row if kind == "cop" else -1
             for k, kind in zip(rows.contacts, rows.kinds, strict=True)
         ]
         self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)

@@ -95,7 +95,7 @@ def test_both_cops_are_in_the_soles_up_to_the_printed_millimetre_and_not_beyond(
         (stance,) = copsense.lateral_sweep(icub, side * y, side * y, 1).stances
         cops = copsense.contact_cops(copsense.solve_equilibrium(stance, CRITERIA[criterion]))
         return min(
-            copsense.edge_margin(contact.polygon, cop).distance
+            copsense.Polygon(contact.polygon).margin(cop).distance
             for contact, cop in zip(stance.contacts, cops, strict=True)
         )
 

@@ -122,7 +122,7 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
     com_axes = tuple(i for i, name in enumerate(COM) if name in names)
     limbs = _limbs(stance, {int(p) for p in place}, com_axes)
     unknowns = {u for limb in limbs for u in limb.unknowns}
-    low, high = _limits(stance)
+    low, high = stance.robot.position_limits
     normals = _normals(stance)
     level = normals[:, 2] > _STEEP
     slopes = np.where(
@@ -221,28 +221,15 @@ def _normals(stance: Stance) -> np.ndarray:
     )
 
 
-def _limits(stance: Stance) -> tuple[np.ndarray, np.ndarray]:
-    model = stance.robot.model
-    low = np.full(model.nv - stance.robot.base_nv, -np.inf)
-    high = -low
-    for joint in list(model.joints)[2:]:
-        bounds = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-        if joint.nq == 1 and bounds[0] < bounds[1]:  # others have no limits to exceed
-            low[joint.idx_v - stance.robot.base_nv] = bounds[0]
-            high[joint.idx_v - stance.robot.base_nv] = bounds[1]
-    return low, high
-
-
 def _limbs(stance: Stance, named: set[int], com_axes: tuple[int, ...]) -> tuple[Limb, ...]:
     """The systems: one for each limb, or one for all where base or CoM tie them together."""
     model, nb = stance.robot.model, stance.robot.base_nv
     limbs: list[tuple[list[int], set[int]]] = []
     for k, contact in enumerate(stance.contacts):
         chain: set[int] = set()
-        for i in model.supports[stance.robot.frame(contact.frame).parentJoint]:
-            if i > 1:
-                joint = model.joints[i]
-                chain |= set(range(joint.idx_v, joint.idx_v + joint.nv)) - named
+        for i in stance.limb(contact):
+            joint = model.joints[i]
+            chain |= set(range(joint.idx_v, joint.idx_v + joint.nv)) - named
         contacts = [k]
         for other in [limb for limb in limbs if limb[1] & chain]:
             limbs.remove(other)

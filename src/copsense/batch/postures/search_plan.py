@@ -106,8 +106,8 @@ def plan_search(
         np.array([u for limb in limbs for u in limb.unknowns], dtype=np.int64),
         np.cumsum([0] + [len(limb.unknowns) for limb in limbs]).astype(np.int64),
         carries,
-        coordinates.low,
-        coordinates.high,
+        np.array(coordinates.low),  # writeable, as all: else the kernel is compiled once more
+        np.array(coordinates.high),
     )
     m, most = (
         len(stance.component_index) + len(coordinates.com_axes),

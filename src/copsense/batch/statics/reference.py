@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch.statics.batch_result import BatchResult, array_names, nothing
-from copsense.contact import half_planes
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.sensitivity import cop_sensitivity
@@ -57,21 +56,13 @@ def fill_row(
 
 def sole_edges(stance: Stance) -> list[np.ndarray]:
     """Half-planes (a_x, a_y, b) of each contact's sole (e, 3); none where there is no sole."""
-    found = []
-    for contact in stance.contacts:
-        if contact.polygon is None or contact.kind == "point":
-            found.append(np.zeros((0, 3)))
-        else:
-            normals, offsets = half_planes(contact.polygon)
-            found.append(np.column_stack([normals, offsets]))
-    return found
+    return [
+        np.column_stack([c.sole.normals, c.sole.offsets]) if c.sole else np.zeros((0, 3))
+        for c in stance.contacts
+    ]
 
 
 def sole_margins(stance: Stance, cops: np.ndarray) -> np.ndarray:
     """Signed distance of each CoP to its sole's nearest edge (nc,); infinite without a sole."""
-    return np.array(
-        [
-            np.min(e[:, 2] - e[:, :2] @ cop, initial=np.inf)
-            for e, cop in zip(sole_edges(stance), cops, strict=True)
-        ]
-    )
+    pairs = zip(stance.contacts, cops, strict=True)
+    return np.array([c.sole.margins(cop) if c.sole else np.inf for c, cop in pairs])

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.plots.reading import DEG, MM, contact_origins, cross_section, labels, world_soles
+from copsense.plots.reading import DEG, MM, contact_origins, labels, world_soles
 from copsense.plots.style import (
     COM_LINE,
     EDGE_LINE,
@@ -24,6 +24,7 @@ from copsense.plots.style import (
     put_legend,
     styled,
 )
+from copsense.polygon import Polygon
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _SETTLED = 0.1  # s until the ground carries the weight evenly
@@ -59,7 +60,7 @@ def plot_sway_cop(recording: xr.Dataset, *, ax: Axes | None = None, legend: bool
     for k in range(len(names)):
         sole, turn = soles[k], recording["contact_rotation"].values[k, 1, :2]
         if sole is not None:
-            found = cross_section(sole, "y", float(origins[k, 0]))
+            found = Polygon.hull(sole).section("y", float(origins[k, 0]))
             if found:
                 ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
                 for edge in found:
@@ -105,7 +106,8 @@ def plot_sway_hip_roll(
             ax.plot(there, static, **_STATIC)
             ax.plot(angle, standing["cop"].values[:, left, 1] * MM, color=colour[name])
             if "sole_polygon" in run:
-                for edge in cross_section(run["sole_polygon"].values[left] * MM, "y", 0.0) or ():
+                sole = Polygon.hull(run["sole_polygon"].values[left] * MM)
+                for edge in sole.section("y", 0.0) or ():
                     ax.axhline(edge, **EDGE_LINE)
     ax.set_xlabel(f"{joint} [deg]")
     ax.set_ylabel("CoP of the left foot, to the left [mm]")

@@ -1,19 +1,17 @@
-"""Convex polygons of the plane: refined from support points, clipped, and made minimal."""
+"""Refinement of a convex region of the plane, between an inner and an outer polygon."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
 
-MERGE = 1e-8  # m: vertices nearer than this to the line of their neighbours are no corners
-_ROUNDING = 1e-12  # m: how far beyond a line a corner may be and still be on it
+from copsense.polygon import segment_distance
 
 Point = Float[np.ndarray, " 2"]
 Points = Float[np.ndarray, "k 2"]
-Pair = Sequence[float]
 
 
 def refine(farthest: Callable[[Point], Point], tolerance: float) -> tuple[Points, Points]:
@@ -66,54 +64,4 @@ def _triangle(p: Point, n: Point, q: Point, m: Point) -> tuple[float, Point]:
     cosine = nx * ey - ny * ex  # of the angle at p; (ey, -ex) is the edge's outward normal
     from_p = length * b / apex
     outer = (px + from_p * (cosine * ex + a * ey), py + from_p * (cosine * ey - a * ex))
-    return _segment_distance(outer, (px, py), (qx, qy)), np.array(outer)
-
-
-def clip(
-    corners: Float[np.ndarray, "k r"], normal: Float[np.ndarray, " r"], offset: float
-) -> Float[np.ndarray, "l r"]:
-    """The part of a convex polygon or interval where normal x <= offset."""
-    beyond = corners @ normal - offset
-    kept: list[np.ndarray] = []
-    for i, j in zip(range(-1, len(corners) - 1), range(len(corners)), strict=True):
-        if (beyond[i] > _ROUNDING) != (beyond[j] > _ROUNDING):
-            share = np.clip(beyond[i] / (beyond[i] - beyond[j]), 0.0, 1.0)
-            kept.append(corners[i] + share * (corners[j] - corners[i]))
-        if beyond[j] <= _ROUNDING:
-            kept.append(corners[j])
-    return np.array(kept).reshape(-1, corners.shape[1])
-
-
-def tidy(polygon: Points) -> Float[np.ndarray, "l 2"]:
-    """The convex polygon without vertices that lie between their neighbours."""
-    corners, i, kept = polygon.tolist(), 0, 0
-    while kept < len(corners) and len(corners) > 1:
-        i %= len(corners)
-        # Its neighbours; of two points each is the other's only one.
-        if _segment_distance(corners[i], corners[i - 1], corners[(i + 1) % len(corners)]) <= MERGE:
-            del corners[i]
-            i, kept = max(i - 1, 0), 0
-        else:
-            i, kept = i + 1, kept + 1
-    if len(corners) == 2:
-        corners.sort(key=sum)
-    return np.array(corners).reshape(-1, 2)
-
-
-def distance(point: Point, polygon: Points) -> float:
-    """Distance from a point to the boundary of a polygon, segment or point [m]."""
-    ends = np.roll(polygon, -1, axis=0)
-    edges = ends - polygon
-    lengths = np.maximum(np.sum(edges**2, axis=1), 1e-300)
-    shares = np.clip(np.sum((point - polygon) * edges, axis=1) / lengths, 0.0, 1.0)
-    return float(np.min(np.linalg.norm(polygon + shares[:, None] * edges - point, axis=1)))
-
-
-def _segment_distance(point: Pair, start: Pair, end: Pair) -> float:
-    """The same for one segment, in plain numbers."""
-    (x, y), (ax, ay), (bx, by) = point, start, end
-    dx, dy = bx - ax, by - ay
-    square = dx * dx + dy * dy
-    share = ((x - ax) * dx + (y - ay) * dy) / square if square > 0 else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(ax + share * dx - x, ay + share * dy - y)
+    return segment_distance(outer, (px, py), (qx, qy)), np.array(outer)

@@ -8,9 +8,10 @@ from jaxtyping import Float
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, limit_rows
-from copsense.regions.balance import com_axes, gravity_at
-from copsense.regions.polygon import Point, clip
+from copsense.polygon import Polygon
+from copsense.regions.refinement import Point
 from copsense.regions.region import BOX, ComRegion, region_between
+from copsense.regions.weight_line import com_axes, gravity_at
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium, WrenchPolicy, solve_equilibrium
@@ -67,9 +68,10 @@ def criterion_region(
         corners = np.array([[-BOX], [BOX]])
     if np.any(offsets[still] < -none[still]):
         corners = corners[:0]
+    left = Polygon(corners @ axes.T)
     for n, offset, length in zip(normals[~still], offsets[~still], size[~still], strict=True):
-        corners = clip(corners, n / length, offset / length)
-    corners = stance.com[:2] + corners @ axes.T
+        left = left.clip(axes @ n / length, offset / length)
+    corners = stance.com[:2] + left.vertices
     return region_between(stance, corners, corners, interval=axes.shape[1] == 1)
 
 

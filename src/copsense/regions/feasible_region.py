@@ -11,9 +11,9 @@ from jaxtyping import Float
 from copsense.arrays import finite_number
 from copsense.errors import InfeasibleError, InvalidInputError
 from copsense.limits import Limits, limit_rows
-from copsense.regions.balance import com_axes, gravity_slope
-from copsense.regions.polygon import MERGE, Point, refine
-from copsense.regions.region import BOX, ComRegion, region_between
+from copsense.regions.refinement import Point, refine
+from copsense.regions.region import BOX, MERGE, ComRegion, region_between
+from copsense.regions.weight_line import com_axes, gravity_slope
 from copsense.stance import Stance
 
 FINEST = 1e-7  # m: tolerances below this ask more than the linear programs resolve

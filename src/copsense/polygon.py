@@ -1,0 +1,323 @@
+"""Polygon: a convex figure of the plane, such as a sole, its edges, and distances to them.
+
+A small exact class of the package's own: Qhull rejects flat input, and neither it nor GEOS numbers
+the edges and names the way they face, which is what margins and limits are about.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.arrays import finite_array
+from copsense.errors import InvalidInputError
+
+_ROUNDING = 1e-12  # m: how far beyond a line a vertex may be and still be on it
+_FLAT = 1e-6  # m: how far a vertex may lie inside the line of its neighbours by rounding
+_AXES = {"x": 0, "y": 1}
+
+Pair = Sequence[float]
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeMargin:
+    """Distance of a point to the nearest edge of a polygon.
+
+    Attributes:
+        distance: signed distance to that edge's line [m]; negative outside.
+        edge: index of the edge, from vertex `edge` to the next.
+        side: which side of the polygon's axes that edge faces, such as ``"+y (left)"``.
+        normal: the edge's outward unit normal (2,).
+    """
+
+    distance: float
+    edge: int
+    side: str
+    normal: Float[np.ndarray, " 2"]
+
+
+@dataclass(frozen=True, eq=False)
+class Polygon:
+    """A convex polygon; two vertices make a segment, one a point, none an empty set.
+
+    Edge i goes from vertex i to the next. A segment's edges are its two ends: it is looked at along
+    its own line, and has no inside across it. Polygons compare and hash by their vertices.
+
+    Attributes:
+        vertices: (k, 2), counter-clockwise, each once [m].
+    """
+
+    vertices: Float[np.ndarray, "k 2"]
+
+    def __post_init__(self) -> None:
+        """Own the vertices.
+
+        Raises:
+            InvalidInputError: not a finite (k, 2) array that goes round counter-clockwise.
+        """
+        v = finite_array(self.vertices, "the polygon", (None, 2), "x, y [m]")
+        object.__setattr__(self, "vertices", v)
+        before, after = v - np.roll(v, 1, axis=0), np.roll(v, -1, axis=0) - v
+        repeated = len(v) > 1 and not np.all(np.any(after != 0, axis=1))
+        inwards = 0.0
+        if len(v) > 2 and not repeated:
+            turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+            along = np.einsum("ij,ij->i", before, after)
+            inwards = float((turn / np.linalg.norm(before + after, axis=1).clip(1e-300)).min())
+            # A star turns left at every vertex too, but goes round more than once.
+            repeated = float(np.arctan2(turn, along).sum()) > 3 * np.pi
+        if repeated or inwards < -_FLAT or self.area < 0:
+            raise InvalidInputError(
+                "the polygon does not go round a convex figure counter-clockwise, each vertex "
+                "once. Use Polygon.hull(points), which puts any points in order."
+            )
+
+    @classmethod
+    def hull(cls, points: ArrayLike, what: str = "the polygon") -> Polygon:
+        """The convex hull of points (k, 2) in any order.
+
+        Args:
+            points: x, y of each point [m].
+            what: how an error calls them.
+
+        Raises:
+            InvalidInputError: not a finite (k, 2) array.
+        """
+        array = finite_array(points, what, (None, 2), "x, y [m]")
+        # Andrew's monotone chain. Rounded to the picometre: noise in x would put the points of an
+        # upright edge out of order.
+        ordered = [tuple(p) for p in np.unique(np.round(array, 12) + 0.0, axis=0)]
+        if len(ordered) < 3:
+            return cls(np.array(ordered).reshape(-1, 2))
+        return cls(np.array(_half(ordered) + _half(ordered[::-1])))
+
+    @classmethod
+    def merged(cls, vertices: Float[np.ndarray, "k 2"], tolerance: float) -> Polygon:
+        """A polygon of vertices in order, without those on the line of their neighbours.
+
+        Of a segment the end of the lesser x + y comes first.
+
+        Args:
+            vertices: (k, 2), counter-clockwise, convex but for rounding; some may be equal [m].
+            tolerance: how near to the segment of its neighbours a vertex is left out [m].
+        """
+        corners, i, kept = vertices.tolist(), 0, 0
+        while kept < len(corners) and len(corners) > 1:
+            i %= len(corners)
+            # Its neighbours; of two points each is the other's only one.
+            around = corners[i - 1], corners[(i + 1) % len(corners)]
+            if segment_distance(corners[i], *around) <= tolerance:
+                del corners[i]
+                i, kept = max(i - 1, 0), 0
+            else:
+                i, kept = i + 1, kept + 1
+        if len(corners) == 2:
+            corners.sort(key=sum)
+        return cls(np.array(corners).reshape(-1, 2))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other is a polygon of the same vertices in the same order."""
+        return isinstance(other, Polygon) and np.array_equal(self.vertices, other.vertices)
+
+    def __hash__(self) -> int:
+        """By the vertices; -0 and 0 are the same."""
+        return hash((len(self.vertices), (self.vertices + 0.0).tobytes()))
+
+    def __len__(self) -> int:
+        """Number of vertices."""
+        return len(self.vertices)
+
+    def __repr__(self) -> str:
+        """What it is, its extent and area."""
+        if len(self) < 2:
+            return f"Polygon({self.vertices.tolist()})"
+        (x0, y0), (x1, y1) = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        return (
+            f"Polygon({len(self)} vertices, x {x0:.4g} to {x1:.4g} m, y {y0:.4g} to {y1:.4g} m, "
+            f"{self.area:.4g} m2)"
+        )
+
+    @cached_property
+    def normals(self) -> Float[np.ndarray, "e 2"]:
+        """Outward unit normal a of each edge: inside where a p <= b, b the `offsets`."""
+        v = self.vertices
+        if len(v) < 2:
+            return _owned(np.zeros((0, 2)))
+        edges = np.roll(v, -1, axis=0) - v
+        if len(v) == 2:
+            return _owned(-edges / np.linalg.norm(edges, axis=1, keepdims=True))
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+        return _owned(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+    @cached_property
+    def offsets(self) -> Float[np.ndarray, " e"]:
+        """Distance b of each edge's line from the origin along its normal [m]."""
+        return _owned(np.sum(self.normals * self.vertices[: len(self.normals)], axis=1))
+
+    @cached_property
+    def area(self) -> float:
+        """Area [m^2]; zero for a segment, a point or nothing."""
+        x, y = (self.vertices - self.vertices[:1]).T
+        return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+    @cached_property
+    def across(self) -> Polygon:
+        """A segment turned by a quarter about its middle: its edges are the segment's two sides."""
+        middle = self.vertices.mean(axis=0)
+        return Polygon(middle + (self.vertices - middle) @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+
+    def distances(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n e"]:
+        """Signed distance of points to the line of each edge [m], positive on the inner side."""
+        return np.asarray(self.offsets - points @ self.normals.T)
+
+    def margins(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
+        """Signed distance of points to the line of the nearest edge [m]; NaN where a point is."""
+        return np.asarray(self.distances(points).min(axis=-1))
+
+    def margin(self, point: ArrayLike) -> EdgeMargin:
+        """The margin of one point (2,) [m] to the nearest edge.
+
+        Raises:
+            InvalidInputError: the point is not finite, or the polygon has no edge.
+        """
+        if len(self) < 2:
+            raise InvalidInputError(
+                f"a polygon of {len(self)} vertices has no edge to be near to. Give two or more."
+            )
+        distances = self.distances(finite_array(point, "the point", (2,), "x, y [m]"))
+        edge = int(np.argmin(distances))
+        return EdgeMargin(float(distances[edge]), edge, self.side(edge), self.normals[edge])
+
+    def boundary_distance(self, point: Float[np.ndarray, " 2"]) -> float:
+        """Distance of a point to the boundary itself [m], infinite where there is none."""
+        ends = np.roll(self.vertices, -1, axis=0)
+        edges = ends - self.vertices
+        lengths = np.maximum(np.sum(edges**2, axis=1), 1e-300)
+        shares = np.clip(np.sum((point - self.vertices) * edges, axis=1) / lengths, 0.0, 1.0)
+        nearest = self.vertices + shares[:, None] * edges
+        return float(np.min(np.linalg.norm(nearest - point, axis=1), initial=np.inf))
+
+    def side(self, edge: int) -> str:
+        """The side of the polygon's axes that an edge faces, such as ``"+y (left)"``."""
+        normal = self.normals[edge]
+        quarter = int(np.round(np.arctan2(normal[1], normal[0]) / (np.pi / 2))) % 4
+        return ("+x (front)", "+y (left)", "-x (back)", "-y (right)")[quarter]
+
+    @cached_property
+    def edge_names(self) -> tuple[str, ...]:
+        """A name of each edge: its side, with its index where several edges face that side."""
+        sides = [self.side(i) for i in range(len(self.normals))]
+        alike = Counter(sides)
+        return tuple(
+            f"the {side} edge" if alike[side] == 1 else f"edge {i}, {side}"
+            for i, side in enumerate(sides)
+        )
+
+    def clip(self, normal: Float[np.ndarray, " 2"], offset: float) -> Polygon:
+        """The part where normal p <= offset."""
+        corners, beyond = self.vertices, self.vertices @ normal - offset
+        kept: list[np.ndarray] = []
+        for i, j in zip(range(-1, len(corners) - 1), range(len(corners)), strict=True):
+            if (beyond[i] > _ROUNDING) != (beyond[j] > _ROUNDING):
+                share = np.clip(beyond[i] / (beyond[i] - beyond[j]), 0.0, 1.0)
+                kept.append(corners[i] + share * (corners[j] - corners[i]))
+            if beyond[j] <= _ROUNDING:
+                kept.append(corners[j])
+        # A vertex on the line, and a segment's end, are met twice.
+        once = [p for i, p in enumerate(kept) if np.any(p != kept[i - 1]) or len(kept) == 1]
+        return Polygon(np.array(once or kept[:1]).reshape(-1, 2))
+
+    def section(self, axis: str, at: float) -> tuple[float, float] | None:
+        """Where the line along an axis, the other coordinate being `at` [m], enters and leaves.
+
+        These two are the edges that a point on that line can reach. None where the line misses the
+        polygon. A segment is looked at along its own line.
+
+        Args:
+            axis: ``"x"`` or ``"y"``.
+            at: the other coordinate [m].
+        """
+        along = _AXES[axis]
+        across = 1 - along
+        v = self.vertices
+        low, high = v[:, across].min(initial=np.inf), v[:, across].max(initial=-np.inf)
+        if 0 <= high - low < 1e-9:  # a segment along the axis
+            return float(v[:, along].min()), float(v[:, along].max())
+        if not low <= at <= high:
+            return None
+        crossings = []
+        for a, b in zip(v, np.roll(v, -1, axis=0), strict=True):
+            least, most = sorted((a[across], b[across]))
+            if least <= at <= most and most > least:
+                part = (at - a[across]) / (b[across] - a[across])
+                crossings.append(a[along] + part * (b[along] - a[along]))
+        return float(min(crossings)), float(max(crossings))
+
+    def room(self, x: float | None = None) -> float:
+        """The largest distance to the nearest edge that a point can have [m].
+
+        Args:
+            x: only points of this x [m]; negative room where the polygon has none.
+        """
+        from scipy.optimize import linprog  # slow to import, and seldom needed
+
+        found = linprog(
+            [0.0, 0.0, -1.0],
+            A_ub=np.column_stack([self.normals, np.ones(len(self.normals))]),
+            b_ub=self.offsets,
+            bounds=[(x, x), (None, None), (None, None)],
+        )
+        return -float(found.fun)
+
+
+def padded(polygons: Sequence[Polygon | None]) -> Float[np.ndarray, "n k 2"]:
+    """Vertices of several polygons as one array for a table.
+
+    A polygon's last vertex is repeated to the length of the longest; NaN where there is none.
+    """
+    known = [np.full((1, 2), np.nan) if p is None else p.vertices for p in polygons]
+    longest = max(map(len, known))
+    return np.array([np.vstack([p, np.repeat(p[-1:], longest - len(p), axis=0)]) for p in known])
+
+
+def unpadded(vertices: Float[np.ndarray, "k 2"]) -> Polygon | None:
+    """One polygon of what `padded` made, or None where it is NaN."""
+    if np.any(np.isnan(vertices)):
+        return None
+    return Polygon(vertices[np.r_[True, np.any(np.diff(vertices, axis=0) != 0, axis=1)]])
+
+
+def segment_distance(point: Pair, start: Pair, end: Pair) -> float:
+    """Distance of a point to a segment [m], in plain numbers."""
+    (x, y), (ax, ay), (bx, by) = point, start, end
+    dx, dy = bx - ax, by - ay
+    square = dx * dx + dy * dy
+    share = ((x - ax) * dx + (y - ay) * dy) / square if square > 0 else 0.0
+    share = min(max(share, 0.0), 1.0)
+    return math.hypot(ax + share * dx - x, ay + share * dy - y)
+
+
+def _half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+    """One side of a hull, without its last point."""
+    chain: list[tuple[float, ...]] = []
+    for p in sequence:
+        while len(chain) >= 2 and _turn(chain[-2], chain[-1], p) <= 1e-15:
+            chain.pop()
+        chain.append(p)
+    return chain[:-1]
+
+
+def _turn(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _owned(array: np.ndarray) -> np.ndarray:
+    array.flags.writeable = False
+    return array
