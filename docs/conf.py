@@ -57,7 +57,7 @@ nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
     (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
-    (r"py:class", r"copsense\.paper\.claim\.Subject"),  # a type variable
+    (r"py:class", r"copsense\.paper\.claims\.claim\.Subject"),  # a type variable
 ]
 
 
@@ -145,8 +145,27 @@ def name_aliases(
     return signature and forward.sub(r"\1", signature), returns and forward.sub(r"\1", returns)
 
 
+def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
+    """Put what is generated from the package's data in the place of its comment on the page."""
+    if page != "theory":
+        return
+    from copsense.paper.claims import VERDICT_STANDARD
+    from copsense.paper.report import errata_markdown
+
+    standard = "\n".join(
+        f"- *{verdict.value}*: {text}" for verdict, text in VERDICT_STANDARD.items()
+    )
+    for name, text in (("errata table", errata_markdown()), ("standard of verdicts", standard)):
+        source[0], count = re.subn(
+            rf"^% {name}: .*$", lambda _, text=text: text, source[0], flags=re.MULTILINE
+        )
+        if count != 1:
+            logger.warning("docs/theory.md has %d places for its %s, not one", count, name)
+
+
 def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings."""
+    app.connect("source-read", write_tables)
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.connect("autodoc-process-signature", name_aliases)
     app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))

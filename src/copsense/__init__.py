@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from copsense._version import __version__
 
 if TYPE_CHECKING:
+    from copsense.analysis import Analysis, analyse
     from copsense.binding import LimitChange, next_change
     from copsense.contact import Contact, Plane, rectangle
     from copsense.cop import (
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
     from copsense.recorded import with_limit_margins
-    from copsense.regions import ComRegion, com_region, criterion_region
+    from copsense.regions import ComRegion, com_region, com_regions, criterion_region
     from copsense.robot import Robot
     from copsense.robots import (
         PRESETS,
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
 __all__ = [
     "CRITERIA",
     "PRESETS",
+    "Analysis",
     "Axis",
     "ComRegion",
     "ConstrainedEquilibrium",
@@ -101,10 +103,12 @@ __all__ = [
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
+    "analyse",
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
     "com_region",
+    "com_regions",
     "contact_cops",
     "cop_sensitivity",
     "criterion_named",
@@ -151,6 +155,7 @@ __all__ = [
 
 # Module -> the names that it gives to this one. Type checkers read the imports above.
 _HOMES = {
+    "copsense.analysis": ("Analysis", "analyse"),
     "copsense.binding": (
         "LimitChange",
         "next_change",
@@ -220,6 +225,7 @@ _HOMES = {
     "copsense.regions": (
         "ComRegion",
         "com_region",
+        "com_regions",
         "criterion_region",
     ),
     "copsense.robot": ("Robot",),

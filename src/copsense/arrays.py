@@ -76,7 +76,9 @@ def finite_number(value: object, what: str, *, positive: bool = False) -> float:
     """
     need = "a positive finite number" if positive else "a finite number"
     try:
-        number = float(value)  # type: ignore[arg-type]
+        # A string or a flag is a mistake, though Python would read a number from it.
+        wrong = isinstance(value, bool | np.bool_ | str)
+        number = math.nan if wrong else float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         number = math.nan
     if not math.isfinite(number) or (positive and number <= 0):

@@ -87,3 +87,11 @@ def test_a_contact_that_the_user_placed_stays_there():
     lowered = copsense.load_stance("iCubGenova04", contacts=with_outline)
     assert lowered.contacts[0].offset[2] == pytest.approx(-0.0105, abs=1e-5)
     assert len(lowered.contacts[0].polygon) == 4
+
+
+@pytest.mark.parametrize("name", ["icub", "human", "four_bar"])
+def test_a_preset_and_load_stance_mean_the_same_by_posture_and_base_rpy(name):
+    preset = copsense.robots.PRESETS[name]
+    rpy = None if name == "four_bar" else preset.base_rpy
+    given = copsense.load_stance(name, posture=preset.posture, base_rpy=rpy)
+    np.testing.assert_array_equal(given.q, copsense.load_stance(name).q)

@@ -8,7 +8,7 @@ import pytest
 from support.reproductions import small_reproduction
 
 import copsense
-from copsense.paper import Verdict, evaluate_sway_claims, stretch, tip_travel
+from copsense.paper.claims import Verdict, evaluate_sway_claims, stretch, tip_travel
 from copsense.paper.report import report_figures, write_report
 from copsense.paper.report.closed_loop_section import score_rows, sway_runs
 from copsense.paper.reproduce import LIMITS, sway_in_simulation

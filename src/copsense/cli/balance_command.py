@@ -22,7 +22,7 @@ from copsense.cli.disturbance_options import (
     read_signal,
 )
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
 
@@ -114,7 +114,7 @@ def balance(
     if output is not None:
         check_output(output, suffixes=(".nc",), overwrite=force)
     if picture is not None:
-        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+        check_output(picture, suffixes=PICTURES, overwrite=force)
     if video is not None:
         from copsense.simulation.video import check_video
 

@@ -15,7 +15,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, echo_written
+from copsense.cli.printing import PICTURES, echo_json, echo_written
 from copsense.cli.quantities import Unit, read_quantity
 from copsense.errors import InvalidInputError, MissingExtraError
 
@@ -109,7 +109,7 @@ def benchmark(
     # A table that is gone on with has its picture drawn anew.
     redraw = force or (output is not None and Path(output).exists())
     if picture is not None:
-        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=redraw)
+        check_output(picture, suffixes=PICTURES, overwrite=redraw)
     if plan_file is None:
         plan = _plan(robots or ("icub",), **options)
     else:

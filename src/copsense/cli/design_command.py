@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.quantities import read_range
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import UnknownNameError
@@ -81,7 +81,7 @@ def design(
     from copsense.storage import check_output
 
     if picture is not None:
-        check_output(picture, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+        check_output(picture, suffixes=PICTURES, overwrite=force)
     within = read_limits(limits) or Limits()
     start, stop, count = read_range(com_y, "m")
     stance = read_stance(robot, **options)

@@ -10,7 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, progress_bar
 from copsense.cli.quantities import Unit, read_quantity
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -118,7 +118,7 @@ def map_command(
 
     check_store(output)
     if plot is not None:
-        check_output(plot, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+        check_output(plot, suffixes=PICTURES, overwrite=force)
         if len(over) < 2:
             raise InvalidInputError("--plot draws over two coordinates. Give --over twice.")
     elif plot_over is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from copsense.cli.limit_options import limits_option, read_limits
-from copsense.cli.printing import echo_written
+from copsense.cli.printing import PICTURES, echo_written
 
 
 @click.command(
@@ -37,6 +37,6 @@ def plot(file: str, output: str | None, limits: str | None, force: bool) -> None
     if chosen is not None:
         dataset = with_limit_margins(dataset, chosen)
     path = Path(file).with_suffix(".png") if output is None else Path(output)
-    check_output(path, suffixes=(".png", ".svg", ".pdf"), overwrite=force)
+    check_output(path, suffixes=PICTURES, overwrite=force)
     save_figure(plot_results(dataset), path, overwrite=force)
     echo_written(path)

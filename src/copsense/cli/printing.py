@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
+
+from copsense.json_data import json_data
 
 
 @contextmanager
@@ -23,21 +24,12 @@ def progress_bar(
         yield bar.update
 
 
+PICTURES = (".png", ".svg", ".pdf")
+
+
 def echo_json(value: Mapping[str, Any]) -> None:
     """Print JSON; infinities, which JSON lacks, become null."""
-    click.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _finite(v) for k, v in value.items()}
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    click.echo(json.dumps(json_data(value), indent=2, allow_nan=False))
 
 
 def echo_written(*paths: str | Path | None) -> None:

@@ -27,8 +27,17 @@ Extension of the Support Region", IEEE Transactions on Robotics 36(4), 2020.
 from __future__ import annotations
 
 from copsense.regions.feasible_region import FINEST, com_region
+from copsense.regions.nested_regions import com_regions
 from copsense.regions.region import BOX, ComRegion
 from copsense.regions.unclipped_region import criterion_region
 from copsense.regions.weight_line import gravity_at
 
-__all__ = ["BOX", "FINEST", "ComRegion", "com_region", "criterion_region", "gravity_at"]
+__all__ = [
+    "BOX",
+    "FINEST",
+    "ComRegion",
+    "com_region",
+    "com_regions",
+    "criterion_region",
+    "gravity_at",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -28,8 +29,8 @@ class Preset:
         load: builds the robot.
         contacts: its feet. Offsets and polygons of `sole_from_geometry` presets are completed from
             the collision geometry.
-        posture: joint name -> position [deg]; others stand at zero.
-        base_rpy: orientation of the base, roll, pitch, yaw [deg].
+        posture: joint name -> position [rad, or m for a prismatic joint]; others stand at zero.
+        base_rpy: orientation of the base, roll, pitch, yaw [rad].
         width: lateral distance between the feet [m], or None to leave it as the posture has it.
         sole_from_geometry: ``"frame"`` reads the polygon only and keeps the contact at the model's
             frame; ``"sole"`` moves the contact to the sole's bottom too; None reads nothing.
@@ -80,9 +81,10 @@ ICUB_MODELS = (
 def _sides(
     angles: Mapping[str, float], left: str, right: str, mirrored: Iterable[str] = ()
 ) -> dict[str, float]:
-    """A symmetric posture: `*` in a joint's name becomes each side's letters."""
+    """A symmetric posture [rad] from angles [deg]: `*` in a name becomes each side's letters."""
     posture = {}
-    for joint, angle in angles.items():
+    for joint, degrees in angles.items():
+        angle = math.radians(degrees)
         posture[joint.replace("*", left)] = angle
         posture[joint.replace("*", right)] = -angle if joint in mirrored else angle
     return posture
@@ -143,7 +145,7 @@ def _icub_named(model: str) -> Preset:
         partial(_icub, model, model),
         (Contact("l_sole", rotation=turn), Contact("r_sole", rotation=turn)),
         _ICUB_POSTURE,
-        base_rpy=(0.0, 0.0, 180.0),
+        base_rpy=(0.0, 0.0, math.pi),
     )
 
 
@@ -166,7 +168,7 @@ _LISTED = (
         partial(_icub, "iCubGenova04", "icub", ICUB_JOINTS),
         (Contact("l_sole"), Contact("r_sole")),
         _ICUB_POSTURE,
-        base_rpy=(0.0, 0.0, 180.0),
+        base_rpy=(0.0, 0.0, math.pi),
         width=0.14,
         sole_from_geometry="frame",
     ),
@@ -175,7 +177,7 @@ _LISTED = (
         "the planar four-bar linkage of [Romano2016] Section IV",
         four_bar_robot,
         (Contact("l_sole", kind="planar"), Contact("r_sole", kind="planar")),
-        {joint: np.degrees(angle) for joint, angle in four_bar_angles(np.pi / 2).items()},
+        four_bar_angles(np.pi / 2),
         sole_from_geometry=None,
     ),
     Preset(
@@ -246,7 +248,7 @@ _LISTED = (
             "left",
             "right",
         ),
-        base_rpy=(90.0, 0.0, 0.0),
+        base_rpy=(math.pi / 2, 0.0, 0.0),
         sole_from_geometry=None,
     ),
     Preset(

@@ -99,14 +99,14 @@ def load_stance(
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     chosen = _complete(robot, chosen, preset, contact_at)
-    angles = {j: float(np.radians(a)) for j, a in preset.posture.items()} if preset else {}
-    q = robot.configuration(angles | dict(posture or {}))
+    own = preset.posture if preset else {}
+    q = robot.configuration({**own, **(posture or {})})
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
             "base_rpy (--base-yaw) out."
         )
-    rpy = np.radians(preset.base_rpy if preset else (0.0, 0.0, 0.0))
+    rpy = np.array(preset.base_rpy if preset else (0.0, 0.0, 0.0))
     if base_rpy is not None:
         rpy = finite_array(base_rpy, "base_rpy (--base-yaw)", (3,), "roll, pitch, yaw [rad]")
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.paper import (
+from copsense.paper.closed_form import (
     FourBar,
     Sampling,
     figure_3a,

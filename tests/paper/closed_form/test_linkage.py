@@ -5,7 +5,7 @@ import pytest
 from support import planar_statics as statics
 
 from copsense.errors import InvalidInputError
-from copsense.paper import FourBar, Hand
+from copsense.paper.closed_form import FourBar, Hand
 from copsense.paper.closed_form.lexicographic import (
     minimise_in_order,
     tangential_norm,

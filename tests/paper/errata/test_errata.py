@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from copsense.errors import InvalidInputError
-from copsense.paper import ERRATA, PRINTED_FORMS, FourBar, evaluate_errata
+from copsense.paper.closed_form import PRINTED_FORMS, FourBar
+from copsense.paper.errata import ERRATA, evaluate_errata
 
 # l = 1, d = 2, m g = 1 and xi = 60 deg: the printed fractions by hand
 HAND = FourBar(leg_length=1.0, rod_length=2.0, leg_mass=0.25, body_mass=0.5, gravity=1.0)

@@ -14,7 +14,7 @@ from support.reproductions import small_reproduction
 import copsense
 from copsense.cli import copsense as command_line
 from copsense.errors import OutputError
-from copsense.paper import Verdict
+from copsense.paper.claims import Verdict
 from copsense.paper.report import (
     check_report_folder,
     render_page,

@@ -1,4 +1,4 @@
-"""evaluate_sway_claims: Section V's claims, judged by the robot in closed loop.
+"""Section V's claims, judged by the robot in closed loop.
 
 "Loaded" is the foot on whose side the CoM is. The paper's robot was real; this one is simulated.
 """
@@ -7,14 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from copsense.paper.claims.claim import (
-    CheckedClaim,
-    Claim,
-    EvaluatedClaim,
-    Finding,
-    evaluate_claims,
-    judge,
-)
+from copsense.paper.claims import icub_cop_claims, icub_force_claims
+from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.sway_runs import Stretch, Sway, completed, tip_travel, tracking_error
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, RIGHT
 
@@ -22,7 +16,8 @@ _TRACKED = 1e-4  # m rms: "tracks"
 _QUASI_STATIC = 1e-3  # m
 
 
-def half_weight(sway: Sway) -> Finding:
+@icub_force_claims.half_weight.again("loop-half-weight")
+def _half_weight(sway: Sway) -> Finding:
     """Fig. 6a."""
     departure = max(float(np.abs(s.load - 0.5).max()) for s in sway.wrench_stretches)
     return Finding(
@@ -34,7 +29,8 @@ def half_weight(sway: Sway) -> Finding:
     )
 
 
-def forces_vary(sway: Sway) -> Finding:
+@icub_force_claims.forces_vary.again("loop-forces-vary")
+def _forces_vary(sway: Sway) -> Finding:
     """Fig. 6b."""
     load = sway.torque_stretch.load[:, LEFT]
     own = float(np.ptp(load))
@@ -44,12 +40,13 @@ def forces_vary(sway: Sway) -> Finding:
         own,
         "m g",
         f"swing of the left foot's measured f_z, from {load.min():.3f} to {load.max():.3f} m g; "
-        f"under criterion 1 it is {other:.4f} m g (ten times as much counts as varying). "
-        "Condition: twice as much does",
+        f"under criterion 1 it is {other:.4f} m g (ten times as much counts as varying)",
+        "twice as much counts as varying",
     )
 
 
-def full_period(sway: Sway) -> Finding:
+@icub_force_claims.full_period.again("loop-full-period")
+def _full_period(sway: Sway) -> Finding:
     """The experiment's outcome."""
     error = tracking_error(sway.torque)
     tips = [tip_travel(run) * 1e3 for run in (sway.left, sway.right)]
@@ -66,7 +63,8 @@ def full_period(sway: Sway) -> Finding:
     )
 
 
-def parallel(sway: Sway) -> Finding:
+@icub_cop_claims.parallel.again("loop-parallel")
+def _parallel(sway: Sway) -> Finding:
     """Fig. 7."""
 
     def spread(found: Stretch) -> float:
@@ -85,7 +83,8 @@ def parallel(sway: Sway) -> Finding:
     )
 
 
-def less_on_support(sway: Sway) -> Finding:
+@icub_cop_claims.less_on_support.again("loop-less-on-support")
+def _less_on_support(sway: Sway) -> Finding:
     """Fig. 8."""
     found = sway.torque_stretch
     ratios = []
@@ -106,7 +105,12 @@ def less_on_support(sway: Sway) -> Finding:
     )
 
 
-def quasi_static(sway: Sway) -> Finding:
+@claim(
+    "loop-quasi-static",
+    "Section V, Fig. 9",
+    "The motion is slow enough for the static analysis to stand for it.",
+)
+def _quasi_static(sway: Sway) -> Finding:
     """Whether what is measured is what the static analysis says at the same CoM."""
 
     def departure(found: Stretch) -> float:
@@ -122,7 +126,12 @@ def quasi_static(sway: Sway) -> Finding:
     )
 
 
-def limits_keep_the_feet(sway: Sway) -> Finding:
+@claim(
+    "loop-limits",
+    "Remark 4",
+    "Inequalities on the wrenches limit the value of the CoP: the two concepts are complementary.",
+)
+def _limits(sway: Sway) -> Finding:
     """Remark 4: what tips without inequalities goes on with them."""
     least = min(float(np.nanmin(run["margin"].values[1:])) for run in sway.limited.values())
     ends = [completed(run) for run in sway.limited.values()]
@@ -136,68 +145,12 @@ def limits_keep_the_feet(sway: Sway) -> Finding:
     )
 
 
-SWAY_CLAIMS: tuple[CheckedClaim[Sway], ...] = (
-    CheckedClaim(
-        Claim(
-            "loop-half-weight",
-            "Section V, Fig. 6a",
-            "Criterion 1: the vertical forces change little from half the weight.",
-        ),
-        half_weight,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-forces-vary",
-            "Section V, Fig. 6b",
-            "Criterion 2: the vertical forces depend on the position of the CoM.",
-        ),
-        forces_vary,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-full-period",
-            "Section V",
-            "One amplitude: criterion 2 tracks a full period of the CoM's sine, criterion 1 needs "
-            "an experiment to each side.",
-        ),
-        full_period,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-parallel",
-            "Section V, Fig. 7",
-            "Criterion 1: the two CoPs move almost in parallel, whichever foot is loaded.",
-        ),
-        parallel,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-less-on-support",
-            "Section V, Fig. 8",
-            "Criterion 2: the loaded foot's CoP moves less than the other one.",
-        ),
-        less_on_support,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-quasi-static",
-            "Section V, Fig. 9",
-            "The motion is slow enough for the static analysis to stand for it.",
-        ),
-        quasi_static,
-    ),
-    CheckedClaim(
-        Claim(
-            "loop-limits",
-            "Remark 4",
-            "Inequalities on the wrenches limit the value of the CoP: the two concepts are "
-            "complementary.",
-        ),
-        limits_keep_the_feet,
-    ),
+SWAY_CLAIMS: tuple[Claim[Sway], ...] = (
+    _half_weight,
+    _forces_vary,
+    _full_period,
+    _parallel,
+    _less_on_support,
+    _quasi_static,
+    _limits,
 )
-
-
-def evaluate_sway_claims(sway: Sway) -> tuple[EvaluatedClaim, ...]:
-    """Judge every claim on one robot's recordings."""
-    return evaluate_claims(SWAY_CLAIMS, sway)

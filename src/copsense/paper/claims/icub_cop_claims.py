@@ -7,7 +7,8 @@ import math
 import numpy as np
 from jaxtyping import Float
 
-from copsense.paper.claims.claim import Finding, judge
+from copsense.paper.claims import cop_claims, modelling_claims
+from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep, first_crossing
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, PAPER_LENGTH, RIGHT
 from copsense.paper.closed_form.dimensions import FourBar
@@ -17,6 +18,11 @@ from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
 _SIMILAR = 0.1  # two curves are similar: within a tenth
 
 
+@claim(
+    "icub-parallel",
+    "Section V, Fig. 7",
+    "Criterion 1: the two CoPs move almost in parallel, whichever foot is loaded.",
+)
 def parallel(sweep: LateralSweep) -> Finding:
     """Fig. 7."""
 
@@ -31,11 +37,16 @@ def parallel(sweep: LateralSweep) -> Finding:
         own,
         "1",
         f"largest difference of the two feet's dCoP/dCoM, which go from {slopes.min():.3f} to "
-        f"{slopes.max():.3f}, L = 1 m (tolerance {NEARLY}). Condition: d << 2 L; with L = d/2 it "
-        f"is {other:.2f}",
+        f"{slopes.max():.3f}, L = 1 m (tolerance {NEARLY})",
+        f"d << 2 L; with L = d/2 it is {other:.2f}",
     )
 
 
+@claim(
+    "icub-less-on-support",
+    "Section V, Fig. 8",
+    "Criterion 2: the loaded foot's CoP moves less than the other one.",
+)
 def less_on_support(sweep: LateralSweep) -> Finding:
     """Fig. 8: both as travel and at every posture off the centre."""
     slope, y = sweep.series[TORQUE].slope, sweep.com_y
@@ -55,6 +66,9 @@ def less_on_support(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim(
+    "icub-hip-roll", "Remark 5", "The left hip roll joint can stand for the four-bar's coordinate."
+)
 def hip_roll_coordinate(sweep: LateralSweep) -> Finding:
     """Remark 5: along this path the joint goes one way, and nearly in proportion to the CoM."""
     monotone = bool(np.all(np.diff(sweep.hip_roll) < 0))
@@ -68,6 +82,11 @@ def hip_roll_coordinate(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim(
+    "icub-similar",
+    "Remark 5, Fig. 9",
+    "The left foot's CoP against hip roll is similar on the four-bar and on the iCub.",
+)
 def similar(sweep: LateralSweep) -> Finding:
     """Fig. 9: the same joint angle from the centre on both mechanisms."""
     roll = sweep.hip_roll - sweep.at(sweep.hip_roll, 0.0)
@@ -89,11 +108,12 @@ def similar(sweep: LateralSweep) -> Finding:
         "largest difference of the two CoPs at equal hip roll, in parts of the four-bar's largest: "
         f"{found[WRENCH][0]:.3f} under criterion 1, {found[TORQUE][0]:.3f} under criterion 2, on "
         "the unloaded foot with the CoM over the other. Slopes at the centre over the four-bar's: "
-        f"{found[WRENCH][1]:.3f} and {found[TORQUE][1]:.3f} (tolerance {_SIMILAR}). Condition: "
+        f"{found[WRENCH][1]:.3f} and {found[TORQUE][1]:.3f} (tolerance {_SIMILAR})",
         "near the centre",
     )
 
 
+@modelling_claims.chart.again("icub-chart")
 def chart(sweep: LateralSweep) -> Finding:
     """Remark 2 on the iCub: one posture, one coordinate, two paths."""
     lateral = _centre_slope(sweep, WRENCH)
@@ -107,6 +127,7 @@ def chart(sweep: LateralSweep) -> Finding:
     )
 
 
+@cop_claims.lower_sensitivity.again("icub-lower-sensitivity")
 def lower_sensitivity(sweep: LateralSweep) -> Finding:
     """The conclusion, foot by foot along the sweep."""
     y = sweep.com_y
@@ -122,9 +143,9 @@ def lower_sensitivity(sweep: LateralSweep) -> Finding:
         "m",
         "CoM travel beyond which the unloaded foot is the more sensitive one under criterion 2, "
         f"{crossing / (2 * sweep.half):.3f} d; with the CoM over a foot it is {over:.2f} times as "
-        f"sensitive as under criterion 1, at the centre {centre:.3f} times. Condition: d < 2 L "
-        f"(with L = d/2 the centre's ratio is {sweep.at(short.max(axis=1), 0.0):.2f}), and the CoM "
-        f"within {crossing * 1e3:.1f} mm of the centre or the loaded foot only",
+        f"sensitive as under criterion 1, at the centre {centre:.3f} times",
+        f"d < 2 L (with L = d/2 the centre's ratio is {sweep.at(short.max(axis=1), 0.0):.2f}), and "
+        f"the CoM within {crossing * 1e3:.1f} mm of the centre or the loaded foot only",
     )
 
 
@@ -150,3 +171,13 @@ def _four_bar_slope(four_bar: FourBar, criterion: str) -> float:
 def _centre_slope(sweep: LateralSweep, criterion: str) -> float:
     """D left CoP / d hip roll of the iCub at the centre, along the sweep [m/rad]."""
     return sweep.at(sweep.series[criterion].slope[:, LEFT] / sweep.hip_rate, 0.0)
+
+
+ICUB_COP_CLAIMS: tuple[Claim[LateralSweep], ...] = (
+    parallel,
+    less_on_support,
+    hip_roll_coordinate,
+    similar,
+    chart,
+    lower_sensitivity,
+)

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from copsense.paper.claims.claim import Finding, judge
+from copsense.paper.claims import force_claims
+from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, RIGHT
 
 _ABOUT = 0.1  # "about", "in general": within a tenth
 
 
+@claim(
+    "icub-equal-legs",
+    "Hypothesis 1-ii",
+    "On the iCub the left leg weighs as much as the right leg.",
+)
 def equal_legs(sweep: LateralSweep) -> Finding:
     """Hypothesis 1-ii."""
     left, right = sweep.leg_masses
@@ -23,6 +29,7 @@ def equal_legs(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim("icub-body-mass", "Hypothesis 1-iii", "On the iCub the upper body weighs twice a leg.")
 def body_mass(sweep: LateralSweep) -> Finding:
     """Hypothesis 1-iii."""
     leg, body = sum(sweep.leg_masses) / 2, sweep.body_mass
@@ -36,6 +43,7 @@ def body_mass(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim("icub-hip-height", "Section V", "The iCub's hips are about 50 cm high.")
 def hip_height(sweep: LateralSweep) -> Finding:
     """The comparison of sizes that Section V makes."""
     return Finding(
@@ -46,6 +54,11 @@ def hip_height(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim(
+    "icub-half-weight",
+    "Section V, Fig. 6a",
+    "Criterion 1: the vertical forces change little from half the weight.",
+)
 def half_weight(sweep: LateralSweep) -> Finding:
     """Fig. 6a."""
 
@@ -57,11 +70,16 @@ def half_weight(sweep: LateralSweep) -> Finding:
         judge(own < NEARLY and other < NEARLY, own < NEARLY),
         own,
         "m g",
-        f"largest departure of f_z from m g / 2 between the feet, L = 1 m (tolerance {NEARLY}). "
-        f"Condition: d << 2 L; with L = d/2 it is {other:.3f} m g",
+        f"largest departure of f_z from m g / 2 between the feet, L = 1 m (tolerance {NEARLY})",
+        f"d << 2 L; with L = d/2 it is {other:.3f} m g",
     )
 
 
+@claim(
+    "icub-mirrored",
+    "Section V",
+    "Criterion 1: towards the right foot the forces behave as towards the left.",
+)
 def mirrored(sweep: LateralSweep) -> Finding:
     """The text on Fig. 6a; the robot's own asymmetry is what is left."""
     load = sweep.series[WRENCH].load
@@ -76,6 +94,11 @@ def mirrored(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim(
+    "icub-forces-vary",
+    "Section V, Fig. 6b",
+    "Criterion 2: the vertical forces depend on the position of the CoM.",
+)
 def forces_vary(sweep: LateralSweep) -> Finding:
     """Fig. 6b."""
     own, other = (float(np.ptp(sweep.series[n].load[:, LEFT])) for n in (TORQUE, WRENCH))
@@ -88,6 +111,11 @@ def forces_vary(sweep: LateralSweep) -> Finding:
     )
 
 
+@claim(
+    "icub-over-the-foot",
+    "Section V",
+    "The robot moves to where its CoM lies over the origin of a foot's frame.",
+)
 def over_the_foot(sweep: LateralSweep) -> Finding:
     """Whether the motion that Section V describes keeps the feet flat without limits."""
     reach = {name: sweep.planted(name) for name in (WRENCH, TORQUE)}
@@ -102,11 +130,17 @@ def over_the_foot(sweep: LateralSweep) -> Finding:
         "m",
         f"farthest the CoM goes with both CoPs in their soles: {reach[TORQUE] * 1e3:.1f} mm under "
         f"criterion 2, {reach[WRENCH] * 1e3:.1f} mm under criterion 1; the foot's origin is at "
-        f"{sweep.half * 1e3:.0f} mm. Condition: the CoPs are kept in the soles by limits (Remark "
-        "4), as shifting the load to that foot would",
+        f"{sweep.half * 1e3:.0f} mm",
+        "the CoPs are kept in the soles by limits (Remark 4), as shifting the load to that foot "
+        "would",
     )
 
 
+@claim(
+    "icub-full-period",
+    "Section V",
+    "One amplitude: criterion 2 tracks a full period of the CoM's sine, criterion 1 does not.",
+)
 def full_period(sweep: LateralSweep) -> Finding:
     """The static part of what the experiment met; the amplitude is not printed."""
     first, second = sweep.planted(WRENCH), sweep.planted(TORQUE)
@@ -120,11 +154,13 @@ def full_period(sweep: LateralSweep) -> Finding:
         second,
         "m",
         "amplitude up to which criterion 2 keeps both CoPs in the soles; criterion 1 up to "
-        f"{first * 1e3:.1f} mm. Condition: the amplitude, which is not printed, lies between the "
-        f"two; with the CoM over a foot, {sweep.half * 1e3:.0f} mm, {kept} them there",
+        f"{first * 1e3:.1f} mm",
+        "the amplitude, which is not printed, lies between the two; with the CoM over a foot, "
+        f"{sweep.half * 1e3:.0f} mm, {kept} them there",
     )
 
 
+@force_claims.tends_to_zero.again("icub-tends-to-zero")
 def tends_to_zero(sweep: LateralSweep) -> Finding:
     """The conclusion's last property."""
     load = sweep.series[TORQUE].load[:, RIGHT]
@@ -138,7 +174,20 @@ def tends_to_zero(sweep: LateralSweep) -> Finding:
         left,
         "m g",
         "f_z on the opposite foot with the CoM over the left one, falling all the way (claimed to "
-        f"tend to 0, tolerance {NEARLY}). Condition: the CoM goes on beyond the foot; extrapolated "
-        f"linearly f_z vanishes at {zero * 1e3:.0f} mm, the foot being at {sweep.half * 1e3:.0f} "
-        "mm",
+        f"tend to 0, tolerance {NEARLY})",
+        "the CoM continues beyond the foot; extrapolated linearly f_z vanishes at "
+        f"{zero * 1e3:.0f} mm, the foot being at {sweep.half * 1e3:.0f} mm",
     )
+
+
+ICUB_FORCE_CLAIMS: tuple[Claim[LateralSweep], ...] = (
+    equal_legs,
+    body_mass,
+    hip_height,
+    half_weight,
+    mirrored,
+    forces_vary,
+    over_the_foot,
+    full_period,
+    tends_to_zero,
+)

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.paper.closed_form.dimensions import FourBar
-from copsense.paper.closed_form.discrepancy import angle_at
 from copsense.paper.closed_form.family import FourBarSolution
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
 
@@ -24,13 +23,13 @@ PARTS = np.linspace(-1.0, 1.0, 41)  # of the way from the centre to a foot
 
 def by_wrench(four_bar: FourBar, travel: float, length: float = PAPER_LENGTH) -> FourBarSolution:
     """Criterion 1 with the CoM `travel` [m] right of the centre, moments over `length` [m]."""
-    xi = angle_at(four_bar, travel)
+    xi = four_bar.angle_at(travel)
     return solve_four_bar(four_bar, xi, "minimum-wrench", characteristic_length=length)
 
 
 def by_torque(four_bar: FourBar, travel: float) -> FourBarSolution:
     """Criterion 2 with the CoM `travel` [m] right of the centre."""
-    return solve_four_bar(four_bar, angle_at(four_bar, travel), "minimum-torque")
+    return solve_four_bar(four_bar, four_bar.angle_at(travel), "minimum-torque")
 
 
 def between_feet(four_bar: FourBar, value: Callable[[float], float]) -> Float[np.ndarray, "n"]:

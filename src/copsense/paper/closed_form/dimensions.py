@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from numbers import Real
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError
-
-
-def finite_number(name: str, value: object) -> float:
-    """Return `value` as a float, or raise if it is not one finite real number."""
-    if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
-        raise InvalidInputError(f"{name} must be one real number; got {value!r}. Give a float.")
-    if not math.isfinite(value):
-        raise InvalidInputError(f"{name} must be finite; got {value!r}. Give a finite float.")
-    return float(value)
-
-
-def positive_number(name: str, value: object) -> float:
-    """Return `value` as a float, or raise if it is not finite and above zero."""
-    number = finite_number(name, value)
-    if number <= 0.0:
-        raise InvalidInputError(
-            f"{name} must be above zero; got {number!r}. Give a positive number in SI units."
-        )
-    return number
 
 
 @dataclass(frozen=True)
@@ -54,9 +35,10 @@ class FourBar:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
-        """Refuse lengths, masses or a gravity that are not finite and positive."""
+        """Reject lengths, masses or a gravity that are not finite and positive."""
         for name in ("leg_length", "rod_length", "leg_mass", "body_mass", "gravity"):
-            object.__setattr__(self, name, positive_number(name, getattr(self, name)))
+            number = finite_number(getattr(self, name), f"the four-bar's {name}", positive=True)
+            object.__setattr__(self, name, number)
 
     @property
     def mass(self) -> float:
@@ -72,6 +54,27 @@ class FourBar:
     def kappa(self) -> float:
         """Kappa = (m_l + m_b) / m: the CoM's travel as a part of the hips' travel, in (1/2, 1)."""
         return (self.leg_mass + self.body_mass) / self.mass
+
+    def angle_at(self, travel: float) -> float:
+        """Angle xi [rad] at which the CoM is `travel` [m] right of the centre.
+
+        Raises:
+            InvalidInputError: the CoM cannot go that far with the feet in place.
+        """
+        reach = self.kappa * self.leg_length
+        if not abs(travel) < reach:
+            raise InvalidInputError(
+                f"the CoM cannot travel {travel:g} m from the centre: kappa l is {reach:g} m. "
+                "Give a FourBar with a shorter rod or longer legs."
+            )
+        # u = kappa l cos(xi)
+        return math.acos(travel / reach)
+
+    def with_kappa(self, kappa: float) -> FourBar:
+        """The same linkage and total mass with another mass ratio kappa, between 1/2 and 1."""
+        # kappa = (m_l + m_b)/m and m = 2 m_l + m_b
+        m = self.mass
+        return replace(self, leg_mass=(1 - kappa) * m, body_mass=(2 * kappa - 1) * m)
 
     def com(self, xi: float) -> Float[np.ndarray, "2"]:
         """Centre of mass [m] at the leg angle `xi` [rad], in the world with the left foot at 0."""

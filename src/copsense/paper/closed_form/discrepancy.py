@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from copsense.errors import InvalidInputError
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.family import FourBarSolution
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
@@ -39,33 +37,10 @@ class Discrepancy:
     agreement: float
 
 
-def angle_at(four_bar: FourBar, travel: float) -> float:
-    """Angle xi [rad] at which the CoM is `travel` [m] right of the centre.
-
-    Raises:
-        InvalidInputError: the CoM cannot go that far with the feet in place.
-    """
-    reach = four_bar.kappa * four_bar.leg_length
-    if not abs(travel) < reach:
-        raise InvalidInputError(
-            f"the CoM cannot travel {travel:g} m from the centre: kappa l is {reach:g} m. "
-            "Give a FourBar with a shorter rod or longer legs."
-        )
-    # u = kappa l cos(xi)
-    return math.acos(travel / reach)
-
-
 def sampled_angles(four_bar: FourBar) -> tuple[float, ...]:
     """Angles xi [rad] that spread the CoM between the feet, lopsidedly so that signs show."""
     half = four_bar.rod_length / 2
-    return tuple(angle_at(four_bar, part * half) for part in _TRAVEL)
-
-
-def with_kappa(four_bar: FourBar, kappa: float) -> FourBar:
-    """The same linkage and total mass with another mass ratio kappa, between 1/2 and 1."""
-    # kappa = (m_l + m_b)/m and m = 2 m_l + m_b
-    m = four_bar.mass
-    return replace(four_bar, leg_mass=(1 - kappa) * m, body_mass=(2 * kappa - 1) * m)
+    return tuple(four_bar.angle_at(part * half) for part in _TRAVEL)
 
 
 def rows(solution: FourBarSolution, quantity: str, hand: Hand) -> Float[np.ndarray, "..."]:

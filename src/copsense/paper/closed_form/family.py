@@ -21,8 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError, UnloadedContactError
-from copsense.paper.closed_form.dimensions import FourBar, finite_number
+from copsense.paper.closed_form.dimensions import FourBar
 
 # Below this share of the weight a foot's vertical force is rounding, and so is its CoP.
 _UNLOADED = 1e-12
@@ -96,7 +97,7 @@ class FourBarSolution:
 
 def leg_angle(xi: object) -> float:
     """Return `xi` as a float, or raise if it is no angle or the linkage is collapsed there."""
-    angle = finite_number("xi", xi)
+    angle = finite_number(xi, "xi [rad]")
     if abs(math.sin(angle)) < _COLLAPSED:
         raise InvalidInputError(
             f"the linkage is collapsed at xi={angle!r}: sin(xi) = 0, the legs lie on the "
@@ -124,8 +125,8 @@ def solve_four_bar_member(
         InvalidInputError: a number is not finite, or sin(xi) = 0.
         UnloadedContactError: a foot carries no vertical force.
     """
-    xi, a = leg_angle(xi), finite_number("share", share)
-    h = finite_number("horizontal_force", horizontal_force)
+    xi, a = leg_angle(xi), finite_number(share, "the share")
+    h = finite_number(horizontal_force, "horizontal_force [N]")
     l, d, kappa, weight = four_bar.leg_length, four_bar.rod_length, four_bar.kappa, four_bar.weight
     c, s = math.cos(xi), math.sin(xi)
     u = kappa * l * c

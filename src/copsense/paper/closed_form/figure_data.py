@@ -2,7 +2,7 @@
 
 Delta xi = pi/2 - xi, so that a positive Delta xi brings the CoM towards the right foot, as in the
 paper's text. Where a foot carries no load its CoP has a pole: samples near it are left out and the
-curve goes on in another segment, so no array holds a NaN or an infinity.
+curve continues in another segment, so no array holds a NaN or an infinity.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
-from copsense.paper.closed_form.dimensions import FourBar, positive_number
+from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.family import FourBarSolution
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
 
@@ -104,15 +105,15 @@ class Sampling:
     least_load: float = 0.02
 
     def __post_init__(self) -> None:
-        """Refuse a range, a count or a load that leaves nothing to sample."""
-        if positive_number("half_range", self.half_range) >= math.pi / 2:
+        """Reject a range, a count or a load that leaves nothing to sample."""
+        if finite_number(self.half_range, "half_range [rad]", positive=True) >= math.pi / 2:
             raise InvalidInputError(
                 f"half_range must be below pi/2 (legs on the ground); got {self.half_range!r}. "
                 "Give it in radians."
             )
         if self.count < 2:
             raise InvalidInputError(f"count must be 2 or more; got {self.count!r}.")
-        if positive_number("least_load", self.least_load) >= 0.5:
+        if finite_number(self.least_load, "least_load", positive=True) >= 0.5:
             raise InvalidInputError(
                 f"least_load must be below 1/2, each foot's load at the centre; got "
                 f"{self.least_load!r}."

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from copsense.arrays import finite_number
 from copsense.errors import UnknownNameError
-from copsense.paper.closed_form.dimensions import FourBar, positive_number
+from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.family import FourBarSolution, leg_angle, solve_four_bar_member
 
 
@@ -88,7 +89,9 @@ def solve_four_bar(
     for name in parameters:
         if name not in chosen.defaults:
             raise UnknownNameError(f"parameter of {criterion!r}", name, chosen.defaults)
-    values = {k: positive_number(k, parameters.get(k, v)) for k, v in chosen.defaults.items()}
+    values = {
+        k: finite_number(parameters.get(k, v), k, positive=True) for k, v in chosen.defaults.items()
+    }
     share, xi, h = chosen.share(four_bar, values), leg_angle(xi), 0.0
     if chosen.equal_hips:
         # both hips carry a Q / 2:  h = -a kappa m g l c² / (d s)

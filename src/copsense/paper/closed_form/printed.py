@@ -107,7 +107,7 @@ def minimum_wrench_sensitivity(four_bar: FourBar, xi: float) -> Float[np.ndarray
 
 
 def _shared_wrenches(four_bar: FourBar, xi: float, half_kappa: float) -> Float[np.ndarray, "2 3"]:
-    """The frame that Eqs. (17) and (31) have in common; `half_kappa` is 3/8 in Eq. (17)."""
+    """The terms that Eqs. (17) and (31) have in common; `half_kappa` is 3/8 in Eq. (17)."""
     l, d, mg = four_bar.leg_length, four_bar.rod_length, four_bar.weight
     c, s = np.cos(xi), np.sin(xi)
     (lam1, lam2), (rho1, rho2) = Linkage(four_bar, Hand.LEFT_AT_PLUS_X).com_to_feet(xi)
@@ -171,7 +171,8 @@ def divergence_angles(four_bar: FourBar, xi: float) -> Float[np.ndarray, "2"]:
 
 
 _S_MINUS, _S_PLUS = Hand.LEFT_AT_MINUS_X, Hand.LEFT_AT_PLUS_X
-_K34, _K35 = Fraction(3, 4), Fraction(3, 5)
+HYPOTHESIS_KAPPA = Fraction(3, 4)  # Hypothesis 1-iii: the rod weighs two legs
+_K34, _K35 = HYPOTHESIS_KAPPA, Fraction(3, 5)
 
 PRINTED_FORMS: Mapping[str, PrintedForm] = MappingProxyType(
     {

@@ -11,7 +11,6 @@ from copsense.paper.closed_form.discrepancy import (
     relative_difference,
     sampled,
     sampled_angles,
-    with_kappa,
 )
 from copsense.paper.closed_form.linkage import Hand, Linkage, wrench_balance
 from copsense.paper.closed_form.printed import PRINTED_FORMS
@@ -58,7 +57,7 @@ def form_difference(
 def at_printed_kappa(four_bar: FourBar, equation: str) -> FourBar:
     """The linkage with the mass ratio that the form's numbers stand for, if they hide one."""
     kappa = PRINTED_FORMS[equation].kappa
-    return four_bar if kappa is None else with_kappa(four_bar, float(kappa))
+    return four_bar if kappa is None else four_bar.with_kappa(float(kappa))
 
 
 def form_check(

@@ -11,7 +11,6 @@ from jaxtyping import Float
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.discrepancy import (
     Discrepancy,
-    angle_at,
     relative_difference,
     sampled,
     sampled_angles,
@@ -122,7 +121,7 @@ def tie_break(four_bar: FourBar) -> Discrepancy:
 def load_over_a_foot(four_bar: FourBar) -> Discrepancy:
     """The text's f_y = m g with the CoM over a foot, under criterion 2 and for share 1."""
     # A hair short of the foot: with a = 1 the other foot would be bare, which is an error.
-    xi = angle_at(four_bar, (0.5 - 1e-10) * four_bar.rod_length)
+    xi = four_bar.angle_at((0.5 - 1e-10) * four_bar.rod_length)
 
     def worst(share: float) -> float:
         load = solve_four_bar_member(four_bar, xi, share).wrenches[1, 1] / four_bar.weight
@@ -139,7 +138,7 @@ def load_over_a_foot(four_bar: FourBar) -> Discrepancy:
 def pole(four_bar: FourBar) -> float:
     """Delta xi [rad] at which criterion 2 unloads a foot: sin(Delta xi) = d / (kappa l)."""
     # a u = d/2 with a = 1/2
-    return math.pi / 2 - angle_at(four_bar, four_bar.rod_length)
+    return math.pi / 2 - four_bar.angle_at(four_bar.rod_length)
 
 
 def divergence(four_bar: FourBar) -> Discrepancy:

@@ -1,52 +1,33 @@
-"""evaluate_errata: where the paper's printed text differs from what holds, with the numbers.
+"""ERRATA: every place where the paper's printed text differs from what holds.
 
-"S-" and "S+" say that the left foot is at -x and at +x.
+"S-" and "S+" say that the left foot is at -x and at +x; c = cos(xi), s = sin(xi).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
 from functools import partial
 
 from copsense.paper.closed_form.dimensions import FourBar
-from copsense.paper.closed_form.discrepancy import Discrepancy
 from copsense.paper.errata import errata_forms as forms
 from copsense.paper.errata import errata_statements as statements
+from copsense.paper.errata.erratum import Erratum, EvaluatedErratum
+from copsense.paper.errata.quantities import (
+    as_printed,
+    cop,
+    load,
+    load_over_foot,
+    moment,
+    redundancy,
+    right_foot_jacobian_entry,
+    sensitivity,
+    sine_of_pole,
+)
 
-
-@dataclass(frozen=True)
-class Erratum:
-    """One correction to [Romano2016].
-
-    Attributes:
-        equation: where.
-        printed: what the paper says.
-        holds: what holds instead.
-        note: why, or under which reading the print is right.
-        check: measures it on a four-bar; None where no number on a four-bar could tell.
-    """
-
-    equation: str
-    printed: str
-    holds: str
-    note: str
-    check: Callable[[FourBar], Discrepancy] | None = None
-
-
-@dataclass(frozen=True)
-class EvaluatedErratum:
-    """An erratum with its numbers.
-
-    Attributes:
-        erratum: the correction.
-        discrepancy: how far the print is off, and that the reason given explains it; None where
-            the erratum has no check.
-    """
-
-    erratum: Erratum
-    discrepancy: Discrepancy | None
-
+_PAPERS = FourBar()
+_POLE = math.degrees(statements.pole(_PAPERS))
+# 14 deg needs kappa sin(14 deg) = d/l
+_NEEDED = _PAPERS.kappa * math.sin(math.radians(14.0))
 
 ERRATA: tuple[Erratum, ...] = (
     Erratum(
@@ -85,17 +66,20 @@ ERRATA: tuple[Erratum, ...] = (
     ),
     Erratum(
         "J_CR",
-        "-d/2 + l c3",
-        "-d/2 - l c3",
+        "$-d / 2 + l c3$",
+        "$-d / 2 - l c3$",
         "the sign of l c3",
         forms.right_jacobian,
+        printed_quantities=(as_printed("J_CR", 1, 2),),
+        holding_quantities=(right_foot_jacobian_entry,),
     ),
     Erratum(
         "(15)",
-        "6/5 and 6/10",
-        "2 kappa and kappa; with kappa = 3/4: f_y = m g (1/2 -/+ 3 d l c / (4 (d² + 4))), "
-        "m_z = m g 3 l c / (2 (d² + 4))",
-        "the numbers are those of kappa = 3/5 (m_b = m_l / 2), against Hypothesis 1-iii; in S-",
+        "f_y / (m g) = $1 / (2 (1 + d² / 4)) + d (5 d ± 6 l c) / (10 (d² + 4))$, "
+        "m_z / (m g) = $6 l c / (5 (d² + 4))$",
+        "f_y / (m g) = $1 / 2 ± kappa d l c / (d² + 4)$, m_z / (m g) = $2 kappa l c / (d² + 4)$",
+        "6/5 and 6/10 are 2 kappa and kappa with kappa = 3/5 (m_b = m_l / 2), against Hypothesis "
+        "1-iii, kappa = 3/4; in S-",
         partial(
             forms.form_check,
             equation="(15)",
@@ -103,11 +87,16 @@ ERRATA: tuple[Erratum, ...] = (
             quantity="wrenches",
             hypothesis="kappa = 3/5, left at -x",
         ),
+        (
+            as_printed("(15)", 1, over_weight=True),
+            as_printed("(15)", 2, over_weight=True),
+        ),
+        (load("minimum-wrench"), moment("minimum-wrench")),
     ),
     Erratum(
         "(16)",
-        "12 and 60 with 6 l d cos(xi)",
-        "eta(±x) = -4 kappa l s (d² + 4) / (d² + 4 ± 2 kappa l d c)²",
+        "eta(±x) = $-60 l s (d² + 4) / (5 d² ± 6 l d c + 20)²$",
+        "eta(±x) = $-4 kappa l s (d² + 4) / (d² + 4 ± 2 kappa l d c)²$",
         "kappa = 3/5, and L and R swapped against (15); the differentiation is right",
         partial(
             forms.form_check,
@@ -116,11 +105,13 @@ ERRATA: tuple[Erratum, ...] = (
             quantity="sensitivity",
             hypothesis="kappa = 3/5, left at +x",
         ),
+        (as_printed("(16)"),),
+        (sensitivity("minimum-wrench"),),
     ),
     Erratum(
         "Appendix A, SCoP",
-        "12 l c / (5 d² ± 6 l d c + 20)",
-        "SCoP(±x) = 2 kappa l c / (d² + 4 ± 2 kappa l d c)",
+        "SCoP(±x) = $12 l c / (5 d² ± 6 l d c + 20)$",
+        "SCoP(±x) = $4 kappa l c / (d² + 4 ± 2 kappa l d c)$",
         "kappa = 3/5, and L and R swapped against (15)",
         partial(
             forms.form_check,
@@ -129,6 +120,8 @@ ERRATA: tuple[Erratum, ...] = (
             quantity="cop",
             hypothesis="kappa = 3/5, left at +x",
         ),
+        (as_printed("Appendix A"),),
+        (cop("minimum-wrench"),),
     ),
     Erratum(
         "(17)",
@@ -165,24 +158,29 @@ ERRATA: tuple[Erratum, ...] = (
     Erratum(
         "(29)",
         "two rows",
-        "Delta = (m g / 2) (kappa l c² / (d s), kappa l c / d, d / 2)",
+        "Delta is m g / 2 times ($kappa l c² / (d s)$, $kappa l c / d$, $d / 2$)",
         "the third row is missing",
         forms.third_row,
+        holding_quantities=(redundancy(0), redundancy(1), redundancy(2)),
     ),
     Erratum("(32)", "rho in SCoP_L", "lambda in SCoP_L", "", forms.left_arm),
     Erratum(
         "(33)",
-        "9 l d c / (20 d ± 6 l c)",
-        "kappa l d c / (2 (d ± kappa l c))",
+        "SCoP(±x) = $9 l d c / (20 d ± 6 l c)$",
+        "SCoP(±x) = $kappa l d c / (2 (d ± kappa l c))$",
         "printed = (31) with Delta_1 and Delta_2 halved once more and kappa = 3/5",
         forms.halved_twice,
+        (as_printed("(33)"),),
+        (cop("minimum-torque"),),
     ),
     Erratum(
         "(18)",
-        "-45 d² l s / (10 d ± 3 l c)²",
-        "-kappa l d² s / (2 (d ± kappa l c)²)",
+        "eta(±x) = $-45 d² l s / (10 d ± 3 l c)²$",
+        "eta(±x) = $-kappa l d² s / (2 (d ± kappa l c)²)$",
         "the derivative of (33), and so as wrong",
         forms.printed_torque_sensitivity,
+        (as_printed("(18)"),),
+        (sensitivity("minimum-torque"),),
     ),
     Erratum(
         "Lemma 3",
@@ -194,16 +192,19 @@ ERRATA: tuple[Erratum, ...] = (
     Erratum(
         "Section IV-B, text after (18)",
         "CoM over a foot: f_y = m g there",
-        "3/4 m g: f_y = (1/2 + a/2) m g with share a = 1/2",
-        "printed (17) itself says so",
+        "f_y = $3 m g / 4$",
+        "(1/2 + a/2) m g with share a = 1/2; printed (17) itself says so",
         statements.load_over_a_foot,
+        holding_quantities=(load_over_foot,),
     ),
     Erratum(
         "Section IV-B, text on Fig. 3b",
         "divergence around ±14 deg",
-        "sin(Delta xi) = d / (kappa l): 21.9 deg for l = 0.5 m, d = 0.14 m, kappa = 3/4",
-        "14 deg needs d / l = 0.181",
+        f"sin(Delta xi) = $d / (kappa l)$: {_POLE:.1f} deg for l = {_PAPERS.leg_length:g} m, "
+        f"d = {_PAPERS.rod_length:g} m, kappa = 3/4",
+        f"14 deg needs d/l = {_NEEDED:.3f}",
         statements.divergence,
+        holding_quantities=(sine_of_pole,),
     ),
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copsense.paper.report.errata_markdown import errata_markdown
 from copsense.paper.report.page import render_page
 from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.report_folder import check_report_folder, write_report
@@ -10,6 +11,7 @@ from copsense.paper.report.static_figures import report_figures
 __all__ = [
     "ReportFigure",
     "check_report_folder",
+    "errata_markdown",
     "render_page",
     "report_figures",
     "write_report",

@@ -7,7 +7,14 @@ import math
 import pandas as pd
 
 from copsense.comparison import CAVEAT, agreement, rank_scores, shown_unit
-from copsense.paper import EvaluatedClaim, Sway, completed, stretch, tip_travel, tracking_error
+from copsense.paper.claims import (
+    EvaluatedClaim,
+    Sway,
+    completed,
+    stretch,
+    tip_travel,
+    tracking_error,
+)
 from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.sway_plots import (
     plot_sway_cop,
@@ -53,8 +60,8 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             _SECTION,
             "Fig. 7a in closed loop, minimum wrench, to the left.",
             f"Both CoPs move with the CoM until the foot tips, at {_mm(tips[0])} of CoM travel and "
-            f"with {left * 1e3:.1f} mm to its sole's edge: the mesh's rounded edge rolls a little "
-            "before.",
+            f"with {left * 1e3:.1f} mm to its sole's edge: contacts of this softness let a sole "
+            "with round edges roll early.",
             "CoP y of both feet against time, parallel, until the right foot tips.",
             lambda: _figure(plot_sway_cop(sway.left)),
         ),
@@ -97,7 +104,8 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             f"Within limits, ±{reach:g} mm.",
             "With inequalities in the controller the CoM goes from over one foot to over the "
             "other: each CoP stops short of its edge, and the other foot carries the rest. "
-            f"Limits: {limit_words(sway.limits)}; nearer to the edge a mesh's rounded sole rolls. "
+            f"Limits: {limit_words(sway.limits)}; nearer to the edge a sole with round edges rolls "
+            "on contacts of this softness. "
             "Dotted: the edges level with the foot's origin; a CoP that moves fore or aft has "
             "others.",
             "CoP y of both feet against time, one panel per criterion, flat near the soles' edges.",

@@ -10,7 +10,8 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 
 from copsense.binding import LimitChange
-from copsense.paper import EvaluatedClaim, EvaluatedErratum, ReferenceValue, Verdict
+from copsense.paper.claims import VERDICT_STANDARD, EvaluatedClaim, ReferenceValue, Verdict
+from copsense.paper.errata import EvaluatedErratum
 from copsense.paper.report.closed_loop_section import (
     score_rows,
     score_words,
@@ -64,6 +65,7 @@ def render_page(
         style=(folder / "report.css").read_text("utf-8"),
         summary=summary(reproduction),
         counts=_counts(reproduction.claims),
+        standard=[(verdict.value.capitalize(), text) for verdict, text in VERDICT_STANDARD.items()],
         claim_tables=(
             ("the four-bar linkage", "four-bar", _claims(reproduction.four_bar_claims)),
             ("the iCub", "icub", _claims(reproduction.icub_claims)),
@@ -124,7 +126,6 @@ def _claims(claims: tuple[EvaluatedClaim, ...]) -> list[dict[str, str]]:
     rows = []
     for evaluated in claims:
         kind, mark, _ = _MARKS[evaluated.verdict]
-        explanation, _, condition = evaluated.explanation.partition("Condition: ")
         rows.append(
             {
                 "identifier": evaluated.claim.identifier,
@@ -134,9 +135,8 @@ def _claims(claims: tuple[EvaluatedClaim, ...]) -> list[dict[str, str]]:
                 "kind": kind,
                 "mark": mark,
                 "number": number(evaluated.number, evaluated.unit),
-                "explanation": explanation.strip(),
-                # a condition counts only where the claim needs it
-                "condition": condition if evaluated.verdict is Verdict.HOLDS_IF else "",
+                "explanation": evaluated.explanation,
+                "condition": evaluated.condition,
             }
         )
     return rows

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from copsense.paper import Curve, FigureData
+from copsense.paper.closed_form import Curve, FigureData
 from copsense.paper.reproduce import UnitOfLength
 from copsense.plots.cops import plot_foot_cop
 from copsense.plots.reading import DEG, MM

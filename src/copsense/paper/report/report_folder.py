@@ -115,12 +115,15 @@ def _write_data(reproduction: Reproduction, folder: Path) -> None:
     _write_json(
         folder / "claims.json",
         [
-            asdict(c.claim)
-            | {
+            {
+                "identifier": c.claim.identifier,
+                "where": c.claim.where,
+                "statement": c.claim.statement,
                 "verdict": c.verdict.value,
                 "number": c.number,
                 "unit": c.unit,
                 "explanation": c.explanation,
+                "condition": c.condition,
             }
             for c in reproduction.claims
         ],

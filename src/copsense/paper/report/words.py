@@ -6,8 +6,9 @@ import math
 from collections import Counter
 
 from copsense.limits import Limits
-from copsense.paper import EvaluatedErratum, Sway, Verdict
+from copsense.paper.claims import Sway, Verdict
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH
+from copsense.paper.errata import EvaluatedErratum
 from copsense.paper.reproduce import Reproduction
 
 _ROUNDING = 1e-9  # differences below this are rounding

@@ -10,7 +10,7 @@ import xarray as xr
 from copsense.controllers import BalancingController, PathReference, Sine, lateral_reference
 from copsense.criterion import Criterion
 from copsense.limits import Limits
-from copsense.paper import Sway
+from copsense.paper.claims import Sway
 from copsense.simulation import MujocoSimulator, Scenario, rollout
 from copsense.simulation.prediction import farther_side, predict, predict_lean
 from copsense.stance import Stance

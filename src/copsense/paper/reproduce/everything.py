@@ -7,20 +7,16 @@ from dataclasses import replace
 
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
-from copsense.paper import (
-    FourBar,
+from copsense.paper.claims import (
     LateralSweep,
     Sway,
     compare_with_reference,
-    evaluate_errata,
     evaluate_four_bar_claims,
     evaluate_icub_claims,
     evaluate_sway_claims,
-    figure_3a,
-    figure_3b,
-    figure_4,
-    figure_5,
 )
+from copsense.paper.closed_form import FourBar, figure_3a, figure_3b, figure_4, figure_5
+from copsense.paper.errata import evaluate_errata
 from copsense.paper.reproduce.benchmark_trials import benchmark_in_simulation
 from copsense.paper.reproduce.clock import Clock, Progress
 from copsense.paper.reproduce.closed_loop import sway_in_simulation
@@ -39,7 +35,9 @@ from copsense.statics import solve_equilibrium
 # What public balancing configurations for this robot use: mu = 1/3, torsion 1/75 m, f_z over 10 N.
 LIMITS = Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
 SWAY_FREQUENCY = 0.05  # Hz: slow enough to be nearly quasi-static; the paper prints none
-_ROLLING = 3e-3  # m: least margin of the CoP in closed loop within limits
+# m, least margin of the CoP in closed loop within limits: soft contacts let a sole with round edges
+# roll before its CoP is at the very edge.
+_ROLLING = 3e-3
 _LEAST = 5  # postures: fewer than this cannot show where anything crosses
 
 
@@ -118,7 +116,6 @@ def reproduce_paper(
 
 
 def _sway(stance: Stance, limits: Limits, frequency: float, clock: Clock) -> Sway:
-    # A sole in the engine rolls a little before its CoP is at the very edge.
     within = replace(limits, cop_margin=max(limits.cop_margin or 0.0, _ROLLING))
     started, progress = time.perf_counter(), clock.progress
     wrench, torque = paper_criteria()

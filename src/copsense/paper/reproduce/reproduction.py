@@ -12,15 +12,9 @@ from jaxtyping import Float
 
 from copsense.binding import LimitChange
 from copsense.limits import Limits
-from copsense.paper import (
-    EvaluatedClaim,
-    EvaluatedErratum,
-    FigureData,
-    FourBar,
-    LateralSweep,
-    ReferenceValue,
-    Sway,
-)
+from copsense.paper.claims import EvaluatedClaim, LateralSweep, ReferenceValue, Sway
+from copsense.paper.closed_form import FigureData, FourBar
+from copsense.paper.errata import EvaluatedErratum
 from copsense.regions import ComRegion
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
@@ -9,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from copsense._version import __version__
-from copsense.paper import FourBar
+from copsense.paper.closed_form import FourBar
 from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
 from copsense.posture import PostureCost
 from copsense.robots import PRESETS
@@ -25,7 +26,9 @@ def describe_parameters(
     """What was computed on: name -> sentence."""
     cost, half, postures = PostureCost(), feet_distance(stance) / 2, lateral.sizes["posture"]
     drop = float(np.mean([c.offset[2] for c in lowered.contacts])) * 1e3
-    deg = ", ".join(f"{j} {a:g}" for j, a in PRESETS[ROBOT].posture.items() if j[0] == "l")
+    deg = ", ".join(
+        f"{j} {math.degrees(a):g}" for j, a in PRESETS[ROBOT].posture.items() if j[0] == "l"
+    )
     return {
         "four-bar": f"l = {four_bar.leg_length:g} m, d = {four_bar.rod_length:g} m, "
         f"m_l = {four_bar.leg_mass:g} kg, m_b = {four_bar.body_mass:g} kg "

@@ -1,0 +1,138 @@
+"""An analysis as text, as HTML and as a table; all of the same rows."""
+
+from __future__ import annotations
+
+import html as markup
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from copsense.analysis.limit_lines import clipped, limit_lines
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Unit = str
+_COLUMNS = (
+    "contact",
+    "load",
+    "CoP x, y [mm]",
+    "margin [mm]",
+    "dCoP_y/dCoM_y",
+    "worst gain",
+    "CoM travel [mm]: tips",
+    "over edge",
+    "unloads",
+)
+_TO_THE_LEFT = ("contact", "margin [mm]")  # words; numbers are aligned to the right
+
+
+def text(data: dict[str, Any], joint_unit: Unit) -> str:
+    """The analysis as ``copsense analyse`` prints it, without the notes."""
+    lines = [*_heading(data)]
+    for name, row in data["criteria"].items():
+        columns, cells = _cells(row, joint_unit)
+        widths = [max(map(len, column)) for column in zip(columns, *cells, strict=True)]
+        lines += ["", _title(name, row)]
+        for line in (columns, *cells):
+            padded = [
+                word.ljust(width) if column in _TO_THE_LEFT else word.rjust(width)
+                for column, word, width in zip(columns, line, widths, strict=True)
+            ]
+            lines.append(f"  {'  '.join(padded)}".rstrip())
+        lines += [f"  {line}" for line in limit_lines(row)]
+    return "\n".join([*lines, "", data["verdict"]])
+
+
+def html(data: dict[str, Any], joint_unit: Unit) -> str:
+    """The analysis for notebooks."""
+    parts = [f"<p>{'<br>'.join(map(markup.escape, _heading(data)))}</p>"]
+    for name, row in data["criteria"].items():
+        columns, cells = _cells(row, joint_unit)
+        head = "".join(f"<th>{markup.escape(column)}</th>" for column in columns)
+        body = "".join(
+            f"<tr>{''.join(f'<td>{markup.escape(word)}</td>' for word in line)}</tr>"
+            for line in cells
+        )
+        below = "<br>".join(map(markup.escape, limit_lines(row)))
+        parts.append(
+            f"<table><caption>{markup.escape(_title(name, row))}</caption><thead><tr>{head}</tr>"
+            f"</thead><tbody>{body}</tbody></table>" + (f"<p>{below}</p>" if below else "")
+        )
+    parts.append(f"<p><strong>{markup.escape(data['verdict'])}</strong></p>")
+    notes = "".join(f"<li>{markup.escape(note)}</li>" for note in data["notes"])
+    return "\n".join(parts) + (f"<ul>{notes}</ul>" if notes else "")
+
+
+def table(data: dict[str, Any]) -> pd.DataFrame:
+    """A row per criterion and contact, vectors as a column per component."""
+    import pandas as pd
+
+    axes = {
+        "wrench": ("fx", "fy", "fz", "mx", "my", "mz"),
+        "cop_gain": ("x_x", "x_y", "y_x", "y_y"),
+    }
+    rows = []
+    for criterion, found in data["criteria"].items():
+        for contact, values in found["contacts"].items():
+            row: dict[str, Any] = {"criterion": criterion, "contact": contact}
+            for name, value in values.items():
+                if getattr(value, "ndim", 0):
+                    labels = axes.get(name, ("x", "y"))
+                    flat = value.ravel().tolist()
+                    row |= {f"{name}_{a}": v for a, v in zip(labels, flat, strict=True)}
+                else:
+                    row[name] = value
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _heading(data: dict[str, Any]) -> Iterator[str]:
+    com = ", ".join(f"{round(float(value), 4) + 0.0:+.4f}" for value in data["com"])
+    yield f"{data['robot']}: {data['mass']:.2f} kg, CoM ({com}) m, world axes"
+    count, motions = len(data["contacts"]), data["admissible_motions"]
+    yield (
+        f"{count} contact{'s' * (count != 1)}, {motions} admissible motion{'s' * (motions != 1)}"
+    )
+
+
+def _title(name: str, row: dict[str, Any]) -> str:
+    return f"{name}: torque norm {row['torque_norm']:.2f} N m, residual {row['residual']:.1e} N"
+
+
+def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[str]]]:
+    """Headings, and a line of words per contact."""
+    contacts = row["contacts"]
+    along = [
+        key for key in next(iter(contacts.values())) if key.startswith("cop_per_")
+    ]  # one at most
+    per, scale = ("mm/mm", 1.0) if joint_unit == "m" else ("mm/deg", 1e3 * math.pi / 180)
+    columns = [*_COLUMNS, *(f"dCoP_y/d{key.removeprefix('cop_per_')} [{per}]" for key in along)]
+    pulls = any(c["pulling"] for c in contacts.values())
+    lines = []
+    for name, c in contacts.items():
+        x, y = (round(float(value) * 1e3, 2) + 0.0 for value in c["cop"])
+        margin = f"{c['margin'] * 1e3:5.1f} to {c['margin_side']}" if "margin" in c else "-"
+        edge = "-" if c["tipping_edge"] is None or clipped(row) else str(c["tipping_edge"])
+        lines.append(
+            [
+                name,
+                f"{c['load_share']:.3f}",
+                f"{x:+.2f}, {y:+7.2f}",
+                margin,
+                f"{c['cop_gain'][1][1]:.3f}",
+                f"{c['worst_case_gain']:.3f}",
+                _travel(c["com_travel"], row),
+                edge,
+                _travel(c["unloading_travel"], row),
+                *(f"{c[key][1] * scale:.3f}" for key in along),
+                *(["PULLING" if c["pulling"] else ""] if pulls else []),
+            ]
+        )
+    return columns + [""] * pulls, lines
+
+
+def _travel(travel: float, row: dict[str, Any]) -> str:
+    if clipped(row):
+        return "clipped"
+    return f"{travel * 1e3:.1f}" if math.isfinite(travel) else "never"

@@ -1,0 +1,130 @@
+"""LimitAnalysis: which limits are active at a posture, and how far along the CoM's path each is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from copsense.binding import LimitChange, next_change
+from copsense.criterion import Criterion
+from copsense.errors import CopsenseError
+from copsense.limits import Limits
+from copsense.margins import LimitMargin, Travel, limit_margins, limit_travel
+from copsense.sensitivity import CopSensitivity
+from copsense.stance import Stance
+from copsense.statics import ActiveLimit, ActiveSetChange, ConstrainedEquilibrium
+
+SIDES = {"+y": 1, "-y": -1}  # to which the CoM may go, world axes
+
+
+@dataclass(frozen=True, eq=False)
+class LimitAnalysis:
+    """A criterion within limits at one posture.
+
+    Attributes:
+        active: limits that hold with equality, the hardest pressed first.
+        optimality: largest violation of a condition of the optimum, relative.
+        margins: distance of each contact and joint to each kind of limit.
+        next_changes: side, ``"+y"`` or ``"-y"`` -> the next limit to bind or let go along the
+            lateral path there, to first order and exact; either is None where none changes within
+            reach. Empty where the active limits are degenerate, so that it cannot be said.
+        travels: side -> how far the CoM may go until the criterion's own wrenches, unclipped, meet
+            each limit.
+    """
+
+    active: tuple[ActiveLimit, ...]
+    optimality: float
+    margins: tuple[LimitMargin, ...]
+    next_changes: Mapping[str, tuple[ActiveSetChange | None, LimitChange | None]]
+    travels: Mapping[str, Travel]
+
+    @property
+    def pressed(self) -> bool:
+        """Whether a limit clips the wrenches."""
+        return any(limit.multiplier for limit in self.active)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The part of a criterion's answer that is about limits, infinities kept."""
+        return {
+            "active_limits": [asdict(limit) for limit in self.active],
+            "optimality": self.optimality,
+            "limit_margins": [asdict(margin) for margin in self.margins],
+            "next_change": {
+                side: {
+                    "first_order": None
+                    if first is None
+                    else {
+                        "name": first.name,
+                        "kind": first.kind,
+                        "binds": first.binds,
+                        "travel": first.travel,
+                    },
+                    "exact": None
+                    if exact is None
+                    else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+                }
+                for side, (first, exact) in self.next_changes.items()
+            },
+            "limit_travel": {
+                side: [
+                    {
+                        "name": met.name,
+                        "margin": met.margin.value,
+                        "unit": met.margin.unit,
+                        "first_order": met.first_order,
+                        "exact": met.exact,
+                    }
+                    for met in travel.limits
+                ]
+                for side, travel in self.travels.items()
+            },
+        }
+
+
+def analyse_limits(
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    found: CopSensitivity,
+    tangent: Float[np.ndarray, " nv"],
+) -> LimitAnalysis:
+    """How one criterion stands with the limits at a posture.
+
+    Args:
+        stance: the posture.
+        criterion: what shares the load.
+        limits: what the wrenches and torques respect.
+        found: the sensitivity of the criterion there, within the limits.
+        tangent: dq/dy of the CoM's lateral path (nv,).
+    """
+    equilibrium = found.equilibrium
+    assert isinstance(equilibrium, ConstrainedEquilibrium)
+    return LimitAnalysis(
+        tuple(equilibrium.active),
+        equilibrium.optimality(),
+        limit_margins(equilibrium, limits),
+        _next_changes(stance, criterion, limits, found, tangent),
+        {side: limit_travel(stance, criterion, limits, way) for side, way in SIDES.items()},
+    )
+
+
+def _next_changes(
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    found: CopSensitivity,
+    tangent: Float[np.ndarray, " nv"],
+) -> dict[str, tuple[ActiveSetChange | None, LimitChange | None]]:
+    """The next change of the active limits to either side; nothing where none can be told."""
+    try:
+        back, forth = found.active_set_changes(tangent)
+        return {
+            side: (forth if way > 0 else back, next_change(stance, criterion, limits, way))
+            for side, way in SIDES.items()
+        }
+    except CopsenseError:
+        return {}

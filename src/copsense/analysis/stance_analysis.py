@@ -1,0 +1,277 @@
+"""analyse: one posture, and which way of sharing the load keeps its feet planted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jaxtyping import Float
+
+from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
+from copsense.analysis.verdicts import verdict
+from copsense.cop import total_center_of_pressure
+from copsense.criterion import Criterion, minimum_torque, minimum_wrench
+from copsense.errors import InvalidInputError
+from copsense.json_data import json_data
+from copsense.limits import Limits, torque_placeholders
+from copsense.posture import solve_posture
+from copsense.robots import sole_notes
+from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
+from copsense.stance import Stance
+from copsense.statics import StaticEquilibrium, WrenchPolicy, policy_name
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from copsense.plots.style import Figure
+
+_ROUNDING = 1e-6  # rad or m: a joint this far beyond its limit is at it
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """The analysis of one posture; printed, it is the table of ``copsense analyse``.
+
+    Attributes:
+        stance: the posture.
+        tangent: dq/dy (nv,) of the CoM's lateral path there, to which slopes refer.
+        sensitivities: criterion's name -> sensitivity of every contact's CoP; its ``equilibrium``
+            holds wrenches and torques.
+        limits: what the wrenches respect; None for nothing.
+        limit_analyses: criterion's name -> active limits, margins and travels; empty without
+            limits.
+        along: the joint per which slopes are given too, or None.
+        notes: what to know about the stance: soles, joint limits, placeholders.
+        checked: whether the derivatives were compared with finite differences.
+    """
+
+    stance: Stance
+    tangent: Float[np.ndarray, " nv"]
+    sensitivities: Mapping[str, CopSensitivity]
+    limits: Limits | None
+    limit_analyses: Mapping[str, LimitAnalysis]
+    along: str | None
+    notes: tuple[str, ...]
+    checked: bool
+
+    @property
+    def equilibria(self) -> dict[str, StaticEquilibrium]:
+        """Criterion's name -> its equilibrium."""
+        return {name: found.equilibrium for name, found in self.sensitivities.items()}
+
+    @property
+    def verdict(self) -> str:
+        """One sentence: which criterion lets the CoM travel farthest."""
+        return str(self._data["verdict"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense analyse --json`` prints: plain data, None for what is infinite.
+
+        Lengths [m], wrenches [N, N m] about the contact frames in contact axes, CoM in world axes.
+        """
+        return dict(json_data(self._data))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A table with a row per criterion and contact; lengths [m], forces [N], moments [N m]."""
+        from copsense.analysis.analysis_table import table
+
+        return table(self._data)
+
+    def plot(self) -> Figure:
+        """The stance from above, `copsense.plots.plot_stance`."""
+        from copsense.plots import plot_stance
+
+        return plot_stance(self.stance, list(self.sensitivities.values()))
+
+    def __str__(self) -> str:
+        """The table, without the notes."""
+        from copsense.analysis.analysis_table import text
+
+        return text(self._data, self._joint_unit)
+
+    def __repr__(self) -> str:
+        """The table and the notes."""
+        return "\n".join([str(self), *(f"note: {note}" for note in self.notes)])
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks."""
+        from copsense.analysis.analysis_table import html
+
+        return html(self._data, self._joint_unit)
+
+    @property
+    def _joint_unit(self) -> str:
+        return "rad" if self.along is None else self.stance.robot.joint_unit(self.along)
+
+    @cached_property
+    def _data(self) -> dict[str, Any]:
+        """The analysis as plain data, infinities kept."""
+        stance, robot = self.stance, self.stance.robot
+        data: dict[str, Any] = {
+            "robot": robot.name,
+            "mass": robot.mass,
+            "com": stance.com,
+            "rank": stance.rank,
+            "admissible_motions": stance.admissible_motions.shape[1],
+            "contacts": [
+                {"name": c.name, "frame": c.frame, "kind": c.kind, "position": p.translation}
+                for c, p in zip(stance.contacts, stance.placements, strict=True)
+            ],
+            "criteria": {name: self._criterion(name) for name in self.sensitivities},
+        }
+        data["verdict"] = verdict(data)
+        return data | {"notes": list(self.notes), "checked": self.checked}
+
+    def _criterion(self, name: str) -> dict[str, Any]:
+        found = self.sensitivities[name]
+        equilibrium, robot = found.equilibrium, self.stance.robot
+        row = {
+            "contacts": self._contacts(found),
+            "torques": dict(zip(robot.torque_names, equilibrium.torques.tolist(), strict=True)),
+            "torque_norm": float((equilibrium.torques**2).sum() ** 0.5),
+            "residual": equilibrium.residual(),
+            "total_cop": total_center_of_pressure(equilibrium),
+        }
+        if name in self.limit_analyses:
+            row |= self.limit_analyses[name].to_dict()
+        return row
+
+    def _contacts(self, found: CopSensitivity) -> dict[str, Any]:
+        equilibrium = found.equilibrium
+        slope = found.along(self.tangent)
+        rows: dict[str, Any] = {}
+        for k, contact in enumerate(self.stance.contacts):
+            edge = int(found.tipping_edge[k])
+            row: dict[str, Any] = {
+                "wrench": equilibrium.wrenches[k],
+                "load_share": float(equilibrium.wrenches[k, 2]) / self.stance.robot.weight,
+                "pulling": contact.name in equilibrium.pulling,
+                "cop": found.cop[k],
+                "cop_slope": slope[k],
+                "cop_gain": found.com_gain[k],
+                "worst_case_gain": float(found.worst_case_gain[k]),
+                "com_travel": float(found.com_travel[k]),
+                "tipping_edge": None if edge < 0 else edge,
+                "unloading_travel": float(found.unloading_travel[k]),
+            }
+            if self.along is not None:
+                row[f"cop_per_{self.along}"] = found.along_joint(self.tangent, self.along)[k]
+            if contact.sole is not None:
+                margin = contact.sole.margin(found.cop[k])
+                row |= {
+                    "margin": margin.distance,
+                    "margin_edge": margin.edge,
+                    "margin_side": margin.side,
+                }
+            rows[contact.name] = row
+        return rows
+
+
+def analyse(
+    stance: Stance,
+    criteria: Sequence[Criterion | WrenchPolicy] | None = None,
+    limits: Limits | None = None,
+    along: str | None = None,
+    *,
+    com_x: float | None = None,
+    com_y: float | None = None,
+    joints: Mapping[str, float] | None = None,
+    check: bool = False,
+) -> Analysis:
+    """Analyse one posture: centre of pressure, margin and sensitivity of every contact.
+
+    Args:
+        stance: the robot on its contacts, such as what `copsense.load_stance` returns.
+        criteria: what shares the load, with distinct names; default the paper's two,
+            ``minimum_wrench(1.0)`` and ``minimum_torque()``.
+        limits: what the wrenches and torques must respect; None for nothing. With limits, the
+            criteria must be `Criterion` values.
+        along: a joint per which the sensitivity is given too, along the CoM's lateral path.
+        com_x: world x of the CoM to move to first [m]; None holds it.
+        com_y: world y likewise [m].
+        joints: joint -> position to hold [rad, or m for a prismatic joint].
+        check: compare the derivatives with finite differences.
+
+    Raises:
+        InvalidInputError: not a stance, or criteria without distinct names.
+        UnreachablePostureError: no posture has the CoM and the joints there.
+        SensitivityMismatchError: the check failed.
+        CopsenseError: a criterion has no solution here.
+    """
+    if not isinstance(stance, Stance):
+        raise InvalidInputError(
+            f"{stance!r} is not a stance. Make one with copsense.load_stance(...)."
+        )
+    if isinstance(criteria, Criterion):
+        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
+    chosen = _named(criteria)
+    if along is not None:
+        stance.robot.velocity_index(along)
+    planar = stance.robot.base_nv != 6
+    x = com_x if com_x is not None or planar else float(stance.com[0])
+    y = float(stance.com[1]) if com_y is None else com_y
+    posture = solve_posture(stance, com=(x, y, None), joints=joints)
+    here, tangent = posture.stance, posture.tangents[:, 0 if x is None else 1]
+    within = limits if limits is not None and limits.any else None
+    found = {name: cop_sensitivity(here, c, within) for name, c in chosen.items()}
+    if check:
+        for criterion in chosen.values():
+            if isinstance(criterion, Criterion):  # a policy's are finite differences themselves
+                check_sensitivity(here, criterion, within)
+    limited = {}
+    if within is not None:
+        for name, criterion in chosen.items():
+            assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
+            limited[name] = analyse_limits(here, criterion, within, found[name], tangent)
+    notes = (*_limit_notes(here, within, limited), *sole_notes(here), *_joint_notes(here))
+    return Analysis(here, tangent, found, within, limited, along, notes, check)
+
+
+def _named(
+    criteria: Sequence[Criterion | WrenchPolicy] | None,
+) -> dict[str, Criterion | WrenchPolicy]:
+    if criteria is None:
+        criteria = (minimum_wrench(1.0), minimum_torque())
+    named = {c.name if isinstance(c, Criterion) else policy_name(c): c for c in criteria}
+    if not named or len(named) != len(criteria):
+        names = ", ".join(named) or "none"
+        raise InvalidInputError(
+            f"an analysis needs criteria of distinct names, got {names}. Give at least one; "
+            "Criterion.named(...) renames one."
+        )
+    return named
+
+
+def _limit_notes(
+    stance: Stance, limits: Limits | None, limited: Mapping[str, LimitAnalysis]
+) -> list[str]:
+    notes = []
+    if limits is not None and limits.torque == "model" and torque_placeholders(stance):
+        notes.append(
+            "no torque limit in the model (a placeholder) for: "
+            + ", ".join(torque_placeholders(stance))
+        )
+    return notes + [
+        f"the limits that {name} presses here are degenerate: the next change of them cannot be "
+        "said. Move a little."
+        for name, analysis in limited.items()
+        if not analysis.next_changes
+    ]
+
+
+def _joint_notes(stance: Stance) -> list[str]:
+    """Which joints are beyond their limits, each in its own unit."""
+    robot = stance.robot
+    return [
+        f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
+        if unit == "rad"
+        else f"{joint} is {excess * 1e3:.1f} mm beyond its limit."
+        for joint, unit, excess in zip(
+            robot.torque_names, robot.torque_units, stance.joint_limit_excess.tolist(), strict=True
+        )
+        if excess > _ROUNDING
+    ]

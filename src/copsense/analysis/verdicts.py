@@ -1,0 +1,72 @@
+"""One sentence on an analysis: which criterion lets the CoM go farthest."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+
+def verdict(data: dict[str, Any]) -> str:
+    """Which criterion keeps the feet planted longest, or meets its first limit last.
+
+    Args:
+        data: an analysis as plain data, infinities kept.
+    """
+    if all("limit_travel" in row for row in data["criteria"].values()):
+        return _within_limits(data)
+    reach = {
+        name: min(
+            (c[key], f"{contact} {word}")
+            for contact, c in row["contacts"].items()
+            for key, word in (("com_travel", "tips"), ("unloading_travel", "unloads"))
+        )
+        for name, row in data["criteria"].items()
+    }
+    blind = [
+        c["name"]
+        for c in data["contacts"]
+        if c["kind"] != "point"
+        and any("margin" not in row["contacts"][c["name"]] for row in data["criteria"].values())
+    ]
+    if blind:
+        return (
+            f"No sole is known under {', '.join(blind)}, so when it tips is not either: give "
+            "--sole X0:X1:Y0:Y1."
+        )
+    best = max(reach, key=lambda name: reach[name][0])
+    distance, event = reach[best]
+    if distance < 0:
+        return f"Every criterion has a contact that tips or pulls; nearest to standing: {best}."
+    if not math.isfinite(distance):
+        return "No contact tips or unloads, to first order."
+    return (
+        f"{best} keeps the feet planted longest: to first order the CoM may move "
+        f"{distance * 1e3:.1f} mm before {event}{_others(reach, best)}."
+    )
+
+
+def _within_limits(data: dict[str, Any]) -> str:
+    """The same of the first limit met to either side, found along the path."""
+    reach = {
+        name: min(
+            (math.inf if t["exact"] is None else t["exact"], t["name"])
+            for travels in row["limit_travel"].values()
+            for t in travels
+        )
+        for name, row in data["criteria"].items()
+    }
+    best = max(reach, key=lambda name: reach[name][0])
+    distance, limit = reach[best]
+    if distance == 0:
+        return "Every criterion meets a limit here already."
+    if not math.isfinite(distance):
+        return f"{best} meets no limit within reach."
+    return (
+        f"{best} is the last to meet a limit: the CoM may move {distance * 1e3:.1f} mm until "
+        f"{limit}{_others(reach, best)}."
+    )
+
+
+def _others(reach: dict[str, tuple[float, str]], best: str) -> str:
+    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n != best)
+    return f" ({others})" if others else ""

@@ -1,0 +1,160 @@
+"""The analysis of one posture in one call: what the command prints, as a result."""
+
+import inspect
+import json
+import math
+
+import numpy as np
+import pytest
+from support.commands import copsense as command
+
+import copsense
+from copsense.errors import InvalidInputError
+from copsense.json_data import json_data
+
+LIMITS = copsense.Limits(friction=0.33, torque="model")
+
+
+@pytest.fixture(scope="module")
+def analysis(icub):
+    return copsense.analyse(icub, along="l_hip_roll")
+
+
+@pytest.fixture(scope="module")
+def limited(icub):
+    return copsense.analyse(icub, [copsense.minimum_torque()], LIMITS)
+
+
+def test_the_command_prints_what_the_function_returns(analysis):
+    answer = command("analyse", "icub", "--along", "l_hip_roll", "--json").json
+    assert answer == json.loads(json.dumps(analysis.to_dict(), allow_nan=False))
+
+
+def test_the_command_moves_holds_and_limits_as_the_function_does(icub):
+    told = command(
+        "analyse", "icub", "--com-y", "20mm", "--joint", "l_elbow=30", "--limits",
+        "friction=0.33,torque=model", "--criterion", "minimum-wrench", "--check", "--json",
+    ).json  # fmt: skip
+    same = copsense.analyse(
+        icub,
+        [copsense.minimum_wrench(1.0)],
+        LIMITS,
+        com_y=0.02,
+        joints={"l_elbow": math.radians(30)},
+        check=True,
+    )
+    assert told == json.loads(json.dumps(same.to_dict(), allow_nan=False))
+    assert told["checked"]
+    assert same.stance.robot.joint_position(same.stance.q, "l_elbow") == pytest.approx(
+        math.radians(30)
+    )
+
+
+def test_it_holds_equilibria_sensitivities_and_a_verdict(analysis, icub):
+    assert list(analysis.sensitivities) == ["minimum-wrench", "minimum-torque"]
+    equilibrium = analysis.equilibria["minimum-torque"]
+    assert equilibrium.wrenches[:, 2].sum() == pytest.approx(icub.robot.weight)
+    assert analysis.verdict.startswith("minimum-torque keeps the feet planted longest")
+    assert analysis.limits is None
+    assert analysis.limit_analyses == {}
+
+
+def test_every_number_is_the_sensitivity_s_own(analysis):
+    found = analysis.sensitivities["minimum-torque"]
+    row = analysis.to_dict()["criteria"]["minimum-torque"]["contacts"]["r_sole"]
+    assert row["com_travel"] == found.com_travel[1]
+    assert row["tipping_edge"] == found.tipping_edge[1]
+    assert row["cop_slope"] == found.along(analysis.tangent)[1].tolist()
+    assert (
+        row["cop_per_l_hip_roll"] == found.along_joint(analysis.tangent, "l_hip_roll")[1].tolist()
+    )
+
+
+def test_the_tipping_edge_is_an_edge_of_the_sole_and_the_margin_s_own_is_named(analysis):
+    contacts = analysis.to_dict()["criteria"]["minimum-wrench"]["contacts"]
+    for contact in analysis.stance.contacts:
+        row = contacts[contact.name]
+        assert 0 <= row["tipping_edge"] < len(contact.polygon)
+        assert 0 <= row["margin_edge"] < len(contact.polygon)
+    # In the middle each foot tips over the edge that is nearest.
+    assert contacts["l_sole"]["tipping_edge"] == contacts["l_sole"]["margin_edge"]
+    assert "(right)" in contacts["l_sole"]["margin_side"]
+
+
+def test_limits_bring_active_limits_margins_and_travels(limited):
+    analysis = limited.limit_analyses["minimum-torque"]
+    assert analysis.active == ()
+    assert not analysis.pressed
+    assert {m.kind for m in analysis.margins} >= {"cop", "friction", "torque"}
+    assert analysis.travels["+y"].first.exact == pytest.approx(0.0459, abs=1e-4)
+    row = limited.to_dict()["criteria"]["minimum-torque"]
+    assert set(row["limit_travel"]) == set(row["next_change"]) == {"+y", "-y"}
+    assert "is the last to meet a limit" in limited.verdict
+
+
+def test_printed_it_is_the_command_s_table(analysis, limited):
+    lines = command("analyse", "icub", "--along", "l_hip_roll").out
+    assert lines.rstrip("\n") == str(analysis)
+    assert repr(analysis).startswith(str(analysis))
+    assert "note: contact 'l_sole' lies 10.5 mm over" in repr(analysis)
+    assert "CoM to +y:   45.9 mm to r_sole" in str(limited)
+    assert len(repr(analysis)) < 3000
+
+
+def test_a_notebook_shows_a_table_with_the_names_escaped(analysis, icub):
+    page = analysis._repr_html_()
+    assert page.count("<table>") == 2
+    assert analysis.verdict in page
+    odd = copsense.analyse(icub, [copsense.minimum_torque(name="a<b>")])
+    assert "a&lt;b&gt;" in odd._repr_html_()
+
+
+def test_the_table_has_a_row_per_criterion_and_contact(analysis):
+    frame = analysis.to_pandas()
+    assert list(frame["criterion"]) == ["minimum-wrench"] * 2 + ["minimum-torque"] * 2
+    assert frame["load_share"].sum() == pytest.approx(2.0)
+    found = analysis.sensitivities["minimum-torque"]
+    np.testing.assert_array_equal(frame[["cop_x", "cop_y"]].values[2:], found.cop)
+    np.testing.assert_array_equal(frame["cop_gain_y_y"].values[2:], found.com_gain[:, 1, 1])
+
+
+def test_it_draws_the_stance(analysis):
+    assert len(analysis.plot().axes) == 2
+
+
+def test_a_point_contact_has_no_margin_and_no_tipping_edge(stance_of):
+    row = copsense.analyse(stance_of("solo12"), [copsense.minimum_wrench(1.0)]).to_dict()
+    contact = row["criteria"]["minimum-wrench"]["contacts"]["FL_FOOT"]
+    assert "margin" not in contact
+    assert contact["tipping_edge"] is None
+
+
+def test_a_policy_is_analysed_under_its_function_s_name(icub):
+    def half_and_half(q):
+        here = icub.at(q)
+        base = here.jacobian[:, :6]
+        return here.unstack(np.linalg.lstsq(base.T, here.gravity[:6])[0])
+
+    found = copsense.analyse(icub, [half_and_half])
+    assert "half_and_half: torque norm" in str(found)
+
+
+@pytest.mark.parametrize("criteria", [[], [copsense.minimum_torque()] * 2])
+def test_criteria_without_distinct_names_are_rejected(icub, criteria):
+    with pytest.raises(InvalidInputError, match="distinct names"):
+        copsense.analyse(icub, criteria)
+
+
+def test_what_is_not_a_stance_or_a_list_of_criteria_is_rejected(icub):
+    unchecked = inspect.unwrap(copsense.analyse)  # the suite's own check of types comes first
+    with pytest.raises(InvalidInputError, match="load_stance"):
+        unchecked("icub")
+    with pytest.raises(InvalidInputError, match="Give a list"):
+        unchecked(icub, copsense.minimum_torque())
+
+
+def test_json_data_is_plain_and_finite():
+    assert json_data({"a": np.array([1.0, np.inf]), "b": (np.float64(2.0), "x", True)}) == {
+        "a": [1.0, None],
+        "b": [2.0, "x", True],
+    }
