@@ -1,4 +1,4 @@
-"""``copsense map``: what it prints, writes and refuses."""
+"""``copsense map``: what it prints, writes and rejects."""
 
 import importlib.util
 import signal
@@ -111,7 +111,7 @@ def test_what_is_not_understood_is_one_line(arguments, word, tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
-def test_postures_lost_are_told_with_the_remedy_and_the_reason(tmp_path):
+def test_lost_postures_are_reported_with_remedy_and_reason(tmp_path):
     ranges = ("--over", "com_x=-0.06:0.06:5", "--over", "com_y=-0.06:0.06:5")
     answer = run("map", "icub", *ranges, "--output", tmp_path / "m.zarr")
     assert answer.code == 1

@@ -16,7 +16,7 @@ def _snapshot(path):
     return {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
 
 
-def test_other_parameters_are_refused_with_what_differs(whole, icub, both, sample):
+def test_other_parameters_are_rejected_with_what_differs(whole, icub, both, sample):
     before = _snapshot(whole[0])
     other = Sample(sample.axes, len(sample), seed=4)
     for changed, word in [
@@ -33,7 +33,7 @@ def test_other_parameters_are_refused_with_what_differs(whole, icub, both, sampl
     assert _snapshot(whole[0]) == before
 
 
-def test_another_robot_or_posture_is_refused(whole, icub, both, sample, stance_of):
+def test_another_robot_or_posture_is_rejected(whole, icub, both, sample, stance_of):
     moved = copsense.load_stance("icub", posture={"torso_yaw": 0.1})
     with pytest.raises(OutputError, match=r"configuration\["):
         copsense.map_postures(moved, sample, both, whole[0], chunk=32)
@@ -47,7 +47,7 @@ def test_another_robot_or_posture_is_refused(whole, icub, both, sample, stance_o
 
 
 @pytest.mark.parametrize("what", ["file", "folder", "zarr", "broken"])
-def test_what_is_no_map_is_refused_and_kept(what, icub, both, sample, tmp_path):
+def test_what_is_not_a_map_is_rejected_and_kept(what, icub, both, sample, tmp_path):
     path = tmp_path / "m.zarr"
     if what == "file":
         path.write_text("precious")

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, progress_bar
-from copsense.cli.quantities import Unit, read_quantity
+from copsense.cli.quantities import read_quantity
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -189,7 +189,7 @@ def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:
         if name in ranges:
             raise InvalidInputError(f"--over names {name} twice. Give each coordinate once.")
         ranges[name] = start, stop, points
-    units = cast("tuple[Unit, ...]", PostureChart(stance, tuple(ranges)).units)
+    units = PostureChart(stance, tuple(ranges)).units
     return [
         Axis(name, read_quantity(start, unit), read_quantity(stop, unit), points)
         for (name, (start, stop, points)), unit in zip(ranges.items(), units, strict=True)

@@ -7,9 +7,9 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from copsense.arrays import whole_number
 from copsense.criterion import Criterion
@@ -21,6 +21,9 @@ from copsense.maps.map_statistics import MapSummary, summarise
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore, check_store, create_map, open_map
 from copsense.stance import Stance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Progress = Callable[[int], object]
 
@@ -130,6 +133,8 @@ def load_map(path: str | Path) -> xr.Dataset:
     Raises:
         OutputError: nothing is at the path, or it is not a map of copsense.
     """
+    import xarray as xr
+
     open_map(path)  # checks what is there
     return xr.open_zarr(Path(path), chunks=None)
 

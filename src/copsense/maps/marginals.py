@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.maps.columns import EVALUATED
 from copsense.maps.reduction import QUANTITIES
 from copsense.maps.store import map_parameters
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _BINS = 48  # at most, along each coordinate of a sample, or of a grid of many values
 _IN_CELL = 4  # postures of a sample, on average
@@ -43,6 +45,14 @@ class Marginal:
     edges: tuple[np.ndarray, np.ndarray]
     criteria: tuple[str, ...]
     values: Float[np.ndarray, "nk a b"]
+
+    def __repr__(self) -> str:
+        """Its quantity, coordinates and size."""
+        shape = " x ".join(str(n) for n in self.values.shape[1:])
+        return (
+            f"Marginal({self.how} {self.quantity} over {' and '.join(self.names)}, {shape} cells; "
+            f"criteria {', '.join(self.criteria)})"
+        )
 
 
 def marginal(

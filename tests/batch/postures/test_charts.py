@@ -155,7 +155,7 @@ def test_a_foot_is_moved_on_its_plane(case, name):
     )
     batch = chart.solve(values[None])
     assert batch.converged[0]
-    here = stance.at(batch.configurations[0])  # on the stated planes, or it would be refused
+    here = stance.at(batch.configurations[0])  # on the stated planes, or it would be rejected
     placed = here.placements[0]
     np.testing.assert_allclose(placed.translation[:2], values[:2], rtol=0, atol=MET)
     normal = (
@@ -171,8 +171,8 @@ def test_a_foot_is_moved_on_its_plane(case, name):
     # The kernel reads where the feet are from the configuration.
     criterion = copsense.minimum_torque()
     found = evaluate_batch(stance, batch.configurations, [criterion])
-    clear = copsense.cop_sensitivity(here, criterion)
-    np.testing.assert_allclose(found.gradient[0, 0], clear.gradient, rtol=0, atol=1e-9)
+    reference = copsense.cop_sensitivity(here, criterion)
+    np.testing.assert_allclose(found.gradient[0, 0], reference.gradient, rtol=0, atol=1e-9)
 
 
 def test_headings_are_absolute(case):
@@ -200,6 +200,7 @@ def test_what_cannot_be_is_a_row_with_its_reason(case):
     z, elbow = chart.values
     batch = chart.solve([[z, elbow], [z + 0.5, elbow], [z, 9.0], [z - 0.01, elbow], [1e9, 1e9]])
     assert list(batch.converged) == [True, False, False, True, False]
+    assert repr(batch) == "PostureBatch(2 postures of 5 rows)"
     assert [bool(r) for r in batch.reasons] == [False, True, True, False, True]
     assert "unreachable" in batch.reasons[1]
     assert "_sole along z" in batch.reasons[1]
@@ -277,9 +278,9 @@ def test_without_numba_the_clear_path_answers_the_same(case, name, monkeypatch):
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "numba" else find(name)
     )
-    clear = PostureChart(stance, names)
-    assert "copsense[fast]" in clear.fallback_reason
-    found = clear.solve(values)
+    reference = PostureChart(stance, names)
+    assert "copsense[fast]" in reference.fallback_reason
+    found = reference.solve(values)
     assert np.array_equal(found.converged, expected.converged)
     assert expected.converged.any()
     assert not expected.converged[3]
@@ -287,7 +288,7 @@ def test_without_numba_the_clear_path_answers_the_same(case, name, monkeypatch):
     assert [r[:20] for r in found.reasons] == [r[:20] for r in expected.reasons]
 
 
-def test_planar_robots_take_the_clear_path(stance_of):
+def test_planar_robots_take_the_reference(stance_of):
     stance = stance_of("four_bar")
     chart = PostureChart(stance, ["com_y"])
     assert chart.fallback_reason
@@ -298,7 +299,7 @@ def test_planar_robots_take_the_clear_path(stance_of):
     assert here.com[1] == pytest.approx(stance.com[1] + 0.02, abs=MET)
 
 
-def test_one_foot_takes_the_clear_path(case):
+def test_one_foot_takes_the_reference(case):
     stance = case("icub").with_contacts(case("icub").contacts[:1])
     chart = PostureChart(stance, ["com_y", "r_knee"])
     batch = chart.solve([[stance.com[1] + 0.02, -0.7]])
@@ -318,13 +319,13 @@ def test_one_foot_takes_the_clear_path(case):
         (["l_sole:z"], "l_sole:x"),
     ],
 )
-def test_bad_coordinates_are_refused(case, names, message):
+def test_bad_coordinates_are_rejected(case, names, message):
     with pytest.raises(copsense.CopsenseError, match=message):
         PostureChart(case("icub"), names)
 
 
 @pytest.mark.parametrize("values", [[[1.0]], [1.0, 2.0], [[np.nan, 0.0]], "posture"])
-def test_bad_values_are_refused(case, values):
+def test_bad_values_are_rejected(case, values):
     with pytest.raises(copsense.CopsenseError, match="values"):
         PostureChart(case("icub"), ["com_y", "yaw"]).solve(values)
 

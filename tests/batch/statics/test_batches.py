@@ -71,13 +71,22 @@ def test_one_posture_is_a_batch_of_one(case, many):
         lambda q: np.frombuffer(b"1" + q.tobytes(), offset=1).reshape(q.shape),
     ],
 )
-def test_numbers_may_lie_as_they_like_and_compile_nothing_anew(case, many, change):
+def test_numbers_may_lie_as_they_like_and_compile_once(case, many, change):
     from copsense.batch.statics.kernel import evaluate_postures
 
     kernel = BatchKernel(case("icub"), [TORQUE])
     expected, known = kernel.evaluate(many[:11]).gradient, len(evaluate_postures.signatures)
     assert np.array_equal(kernel.evaluate(change(many[:11])).gradient, expected)
     assert len(evaluate_postures.signatures) == known
+
+
+def test_results_are_printed_in_one_line(case, many):
+    found = evaluate_batch(case("icub"), many[:3], [TORQUE])
+    assert repr(found) == (
+        "BatchResult(3 postures; criteria minimum-torque; contacts l_sole, r_sole)"
+    )
+    failed = replace(found, reasons={(1, 0): "no load"})
+    assert "3 postures, 1 failed;" in repr(failed)
 
 
 def test_no_posture_is_an_empty_batch(case):
@@ -98,19 +107,19 @@ def test_no_posture_is_an_empty_batch(case):
         (lambda q: np.where(np.arange(3)[:, None] == 1, q * 1.01, q), "row 1: .*unit length"),
     ],
 )
-def test_bad_configurations_are_refused(case, many, change, message):
+def test_bad_configurations_are_rejected(case, many, change, message):
     with pytest.raises(copsense.CopsenseError, match=message):
         evaluate_batch(case("icub"), change(many[:3]), [TORQUE])
 
 
 @pytest.mark.parametrize("change", [lambda q: q[:-1], lambda q: q * np.nan, lambda q: q * 1.01])
-def test_a_bad_single_configuration_is_refused(case, many, change):
+def test_a_bad_single_configuration_is_rejected(case, many, change):
     kernel = BatchKernel(case("icub"), [TORQUE])
     with pytest.raises(copsense.CopsenseError, match="configuration"):
         kernel.one(change(many[0]))
 
 
-def test_bad_requests_are_refused(case, many):
+def test_bad_requests_are_rejected(case, many):
     stance, q = case("icub"), many[:3]
     with pytest.raises(copsense.CopsenseError, match="distinct names"):
         evaluate_batch(stance, q, [TORQUE, TORQUE])
@@ -134,7 +143,7 @@ def test_bad_requests_are_refused(case, many):
 
 
 @pytest.mark.parametrize("value", [0, -1, 1.5, None, "2", np.nan, np.inf, np.arange(2), 1j])
-def test_what_is_no_whole_number_is_refused(value):
+def test_what_is_not_a_whole_number_is_rejected(value):
     with pytest.raises(copsense.CopsenseError, match=r"threads is .* whole number from 1"):
         whole_number(value, "threads")
     assert whole_number(np.int64(3), "threads") == whole_number(3.0, "threads") == 3

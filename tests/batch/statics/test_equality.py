@@ -1,4 +1,4 @@
-"""A batch gives what the clear path gives, whatever the robot, the contacts and the criterion."""
+"""A batch gives what the reference gives, for every robot, contact and criterion."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def largest_error(given, expected):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_kernel_equals_the_clear_path(case, name):
+def test_the_kernel_equals_the_reference(case, name):
     stance = case(name)
     kernel, criteria = BatchKernel(stance, served(stance)), served(stance)
     assert not kernel.fallback_reason
@@ -34,17 +34,17 @@ def test_the_kernel_equals_the_clear_path(case, name):
         here = stance.at(row)
         np.testing.assert_allclose(found.com[i], here.com, rtol=0, atol=1e-13)
         for j, criterion in enumerate(criteria):
-            clear = copsense.cop_sensitivity(here, criterion)
+            reference = copsense.cop_sensitivity(here, criterion)
             pairs = {
-                "wrenches": clear.equilibrium.wrenches,
-                "torques": clear.equilibrium.torques,
-                "cops": clear.cop,
-                "gradient": clear.gradient,
-                "com_gain": clear.com_gain,
-                "com_travel": clear.com_travel,
-                "load_share": clear.equilibrium.wrenches[:, 2] / stance.robot.weight,
+                "wrenches": reference.equilibrium.wrenches,
+                "torques": reference.equilibrium.torques,
+                "cops": reference.cop,
+                "gradient": reference.gradient,
+                "com_gain": reference.com_gain,
+                "com_travel": reference.com_travel,
+                "load_share": reference.equilibrium.wrenches[:, 2] / stance.robot.weight,
             }
-            assert np.array_equal(found.tipping_edge[i, j], clear.tipping_edge)
+            assert np.array_equal(found.tipping_edge[i, j], reference.tipping_edge)
             for what, value in pairs.items():
                 error = largest_error(getattr(found, what)[i, j][None, None], value[None, None])
                 assert error < RELATIVE, (what, i, criterion.name, error)
@@ -64,13 +64,13 @@ def test_every_kind_of_joint_is_served():
     kernel = BatchKernel(stance, served(stance))
     assert not kernel.fallback_reason
     q = postures(stance, 10)
-    found, clear = kernel.evaluate(q), clear_path(stance, q)
+    found, reference = kernel.evaluate(q), reference_answers(stance, q)
     assert not found.reasons
     for what in ("wrenches", "torques", "gradient", "com_gain"):
-        assert largest_error(getattr(found, what), getattr(clear, what)) < RELATIVE
+        assert largest_error(getattr(found, what), getattr(reference, what)) < RELATIVE
 
 
-def clear_path(stance, q):
+def reference_answers(stance, q):
     kernel = BatchKernel(stance, served(stance))
     kernel.fallback_reason = "asked for"
     return kernel.evaluate(q)

@@ -1,4 +1,4 @@
-"""What the kernel does not cover goes through the clear path, and callers cannot tell."""
+"""What the kernel does not cover is answered by the reference, and callers see no difference."""
 
 import importlib.util
 
@@ -13,34 +13,36 @@ from copsense.batch import BatchKernel, evaluate_batch
 TORQUE = copsense.minimum_torque()
 
 
-def clear_answer(stance, q, criterion):
+def reference_answer(stance, q, criterion):
     try:
         return copsense.cop_sensitivity(stance.at(q), criterion), ""
     except copsense.CopsenseError as error:
         return None, str(error)
 
 
-def same_as_clear(stance, q, criteria):
+def same_as_reference(stance, q, criteria):
     found = evaluate_batch(stance, q, criteria)
     for i, row in enumerate(q):
         for j, criterion in enumerate(criteria):
-            clear, reason = clear_answer(stance, row, criterion)
-            if clear is None:
+            reference, reason = reference_answer(stance, row, criterion)
+            if reference is None:
                 assert found.reasons[i, j] == reason
                 assert np.all(np.isnan(found.gradient[i, j]))
                 assert np.all(np.isnan(found.wrenches[i, j]))
                 continue
             assert (i, j) not in found.reasons
-            np.testing.assert_allclose(found.wrenches[i, j], clear.equilibrium.wrenches, rtol=1e-12)
-            np.testing.assert_allclose(found.gradient[i, j], clear.gradient, rtol=0, atol=1e-12)
-            np.testing.assert_allclose(found.com_gain[i, j], clear.com_gain, rtol=0, atol=1e-11)
+            np.testing.assert_allclose(
+                found.wrenches[i, j], reference.equilibrium.wrenches, rtol=1e-12
+            )
+            np.testing.assert_allclose(found.gradient[i, j], reference.gradient, rtol=0, atol=1e-12)
+            np.testing.assert_allclose(found.com_gain[i, j], reference.com_gain, rtol=0, atol=1e-11)
     return found
 
 
-def test_other_criteria_are_answered_by_the_clear_path(case):
+def test_other_criteria_are_answered_by_the_reference(case):
     stance = case("icub")
 
-    def law(q):
+    def policy(q):
         return copsense.solve_equilibrium(stance.at(q), TORQUE).wrenches
 
     criteria = [
@@ -48,18 +50,18 @@ def test_other_criteria_are_answered_by_the_clear_path(case):
         copsense.weighted_torque("inverse inertia", name="inertia"),
         copsense.minimum_tangential(TORQUE),
         copsense.reference_wrench(np.tile([0, 0, 150.0, 0, 0, 0], (2, 1)), 0.5),
-        law,
+        policy,
     ]
     kernel = BatchKernel(stance, criteria)
     assert not kernel.fallback_reason
-    found = same_as_clear(stance, postures(stance, 2), criteria)
-    assert found.criteria == (*(c.name for c in criteria[:4]), "law")
+    found = same_as_reference(stance, postures(stance, 2), criteria)
+    assert found.criteria == (*(c.name for c in criteria[:4]), "policy")
 
 
-def test_planar_robots_are_answered_by_the_clear_path(stance_of):
+def test_planar_robots_are_answered_by_the_reference(stance_of):
     stance = stance_of("four_bar")
     assert BatchKernel(stance, [copsense.minimum_wrench(1.0)]).fallback_reason
-    same_as_clear(stance, np.array([off_centre(stance).q]), [copsense.minimum_wrench(1.0)])
+    same_as_reference(stance, np.array([off_centre(stance).q]), [copsense.minimum_wrench(1.0)])
 
 
 def redundant(name, stance):
@@ -83,20 +85,20 @@ def redundant(name, stance):
 
 
 @pytest.mark.parametrize("name", ["heel and toe", "legs of two joints"])
-def test_contacts_without_rank_are_left_to_the_clear_path(icub, name):
+def test_contacts_without_rank_are_left_to_the_reference(icub, name):
     # Undetermined wrenches are said so, not invented; the minimum wrench and a tie-break stand.
     wrench = copsense.minimum_wrench(1.0)
     tied = copsense.minimum_torque(tie_break=wrench, name="tied")
     stance = redundant(name, icub)
     assert stance.rank < len(stance.component_index)
     assert not BatchKernel(stance, [wrench, TORQUE, tied]).fallback_reason
-    found = same_as_clear(stance, np.array([stance.q, stance.q]), [wrench, TORQUE, tied])
+    found = same_as_reference(stance, np.array([stance.q, stance.q]), [wrench, TORQUE, tied])
     assert set(found.reasons) == {(0, 1), (1, 1)}
 
 
-def test_exactly_straight_knees_are_the_clear_paths(icub):
+def test_exactly_straight_knees_are_the_references(icub):
     q = straight_leg(icub, 0.0)
-    same_as_clear(icub.at(q), np.array([q]), [copsense.minimum_wrench(1.0), TORQUE])
+    same_as_reference(icub.at(q), np.array([q]), [copsense.minimum_wrench(1.0), TORQUE])
 
 
 @pytest.mark.parametrize("angle", [1e-4, 1e-3])
@@ -107,9 +109,9 @@ def test_nearly_straight_knees_are_answered_by_the_kernel(icub, angle):
     kernel.evaluate(q[None])
     single = kernel.one(q)
     assert not kernel._single.doubtful.any()
-    clear = copsense.cop_sensitivity(stance, TORQUE)
-    scale = np.abs(clear.gradient).max()
-    assert np.abs(single.gradient[0, 0] - clear.gradient).max() < 1e-9 * scale
+    reference = copsense.cop_sensitivity(stance, TORQUE)
+    scale = np.abs(reference.gradient).max()
+    assert np.abs(single.gradient[0, 0] - reference.gradient).max() < 1e-9 * scale
 
 
 def straight_leg(stance, angle):
@@ -133,7 +135,7 @@ def test_a_contact_off_its_plane_is_a_failed_row(case):
     stance = case("talos on slopes")
     q = postures(stance, 3)
     q[1, 2] += 1e-5  # the whole robot, 10 micrometres up
-    found = same_as_clear(stance, q, [TORQUE])
+    found = same_as_reference(stance, q, [TORQUE])
     assert list(found.reasons) == [(1, 0)]
     assert "not on its plane" in found.reasons[1, 0]
 
@@ -175,6 +177,6 @@ def test_without_numba_the_clear_path_answers_all(case, monkeypatch):
     )
     kernel = BatchKernel(stance, served(stance))
     assert "copsense[fast]" in kernel.fallback_reason
-    clear = kernel.evaluate(q)
-    np.testing.assert_allclose(clear.gradient, fast.gradient, rtol=0, atol=1e-11)
+    reference = kernel.evaluate(q)
+    np.testing.assert_allclose(reference.gradient, fast.gradient, rtol=0, atol=1e-11)
     np.testing.assert_allclose(kernel.one(q[0]).torques[0], fast.torques[0], rtol=0, atol=1e-10)

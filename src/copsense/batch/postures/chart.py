@@ -12,11 +12,13 @@ from dataclasses import fields
 from functools import partial
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import whole_number
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.postures.coordinates import (
+    Unit,
     chart_coordinates,
     checked_values,
     joint_units,
@@ -61,6 +63,12 @@ class PostureChart:
         values: of the stance itself (k,).
         fallback_reason: why postures are solved one at a time; empty where the kernel does it.
     """
+
+    stance: Stance
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    values: Float[np.ndarray, " k"]
+    fallback_reason: str
 
     def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
         """Find out what the names mean.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -17,11 +18,13 @@ from copsense.arrays import finite_array
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
+Unit = Literal["m", "rad"]
+
 COM = ("com_x", "com_y", "com_z")
 BASE = ("base_x", "base_y", "base_z", "roll", "pitch", "yaw")
 FOOT = ("x", "y", "yaw")
 _WAYS = ("along x", "along y", "along z", "about x", "about y", "about z")
-_UNITS = ("m", "m", "m", "rad", "rad", "rad")
+_UNITS: tuple[Unit, ...] = ("m", "m", "m", "rad", "rad", "rad")
 _STEEP = 0.2  # least vertical part of a plane's normal for a foot to be moved on it
 
 
@@ -61,7 +64,7 @@ class Coordinates:
     """
 
     names: tuple[str, ...]
-    units: tuple[str, ...]
+    units: tuple[Unit, ...]
     given: np.ndarray
     place: np.ndarray
     com_axes: tuple[int, ...]
@@ -178,7 +181,7 @@ def _one(stance: Stance, joint: str) -> bool:
     return int(stance.robot.model.joints[stance.robot.joint_id(joint)].nv) == 1
 
 
-def _unit(stance: Stance, name: str) -> str:
+def _unit(stance: Stance, name: str) -> Unit:
     if name in stance.robot.joint_names:
         kind = stance.robot.model.joints[stance.robot.joint_id(name)].shortname()
         return "m" if kind.startswith("JointModelP") else "rad"

@@ -32,6 +32,10 @@ class PostureBatch:
         """Number of rows."""
         return len(self.converged)
 
+    def __repr__(self) -> str:
+        """How many rows it has, and how many of them a posture."""
+        return f"PostureBatch({int(self.converged.sum())} postures of {len(self)} rows)"
+
 
 def empty_postures(stance: Stance, count: int) -> PostureBatch:
     """A batch to be filled."""

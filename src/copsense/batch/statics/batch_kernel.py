@@ -44,6 +44,12 @@ class BatchKernel:
             part.
     """
 
+    stance: Stance
+    criteria: tuple[Criterion | WrenchPolicy, ...]
+    names: tuple[str, ...]
+    gains: bool
+    fallback_reason: str
+
     def __init__(
         self, stance: Stance, criteria: Sequence[Criterion | WrenchPolicy], *, gains: bool = True
     ) -> None:

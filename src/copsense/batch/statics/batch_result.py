@@ -55,6 +55,14 @@ class BatchResult:
         """Number of postures."""
         return len(self.com)
 
+    def __repr__(self) -> str:
+        """Its size, criteria and contacts."""
+        failed = f", {len(self.reasons)} failed" if self.reasons else ""
+        return (
+            f"BatchResult({len(self)} postures{failed}; criteria {', '.join(self.criteria)}; "
+            f"contacts {', '.join(self.contacts)})"
+        )
+
     @property
     def nbytes(self) -> int:
         """Size of all arrays [B]."""
