@@ -215,8 +215,8 @@ def failing(q):
         (wrong_shape, "shape (3,)"),
         (nan, "not finite at index 0, 0"),
         (ragged, "not an array of numbers"),
-        (nothing, "law 'nothing'"),
-        (failing, "raised KeyError: 'gain'. Mend it"),
+        (nothing, "policy 'nothing'"),
+        (failing, "raised KeyError: 'gain'. Fix it"),
     ],
 )
 def test_a_law_that_answers_wrongly_is_named_with_what_was_wrong(icub, law, said):
@@ -233,7 +233,7 @@ def test_a_law_s_own_error_stays_in_sight(icub):
 
 def test_a_law_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path):
     dataset = copsense.sweep(lateral_path, [failing, copsense.minimum_torque()])
-    failed = copsense.failed_rows(dataset)
+    failed = dataset.failed_rows
     assert {name for _, name, _ in failed} == {"failing"}
     assert len(failed) == len(lateral_path)
     assert not np.any(np.isnan(dataset["cop"].sel(criterion="minimum-torque")))

@@ -139,8 +139,8 @@ def test_a_com_x_that_is_not_finite_is_not_a_sweep_of_failures(icub):
 def test_a_posture_out_of_reach_is_a_row_with_its_reason_and_no_numbers(icub):
     path = copsense.lateral_sweep(icub, 0.0, 5.0, 2)
     dataset = copsense.sweep(path, [copsense.minimum_torque()])
-    assert [(i, name) for i, name, _ in copsense.failed_rows(dataset)] == [(1, "minimum-torque")]
-    assert "CoM y = 5 m" in copsense.failed_rows(dataset)[0][2]
+    assert [(i, name) for i, name, _ in dataset.failed_rows] == [(1, "minimum-torque")]
+    assert "CoM y = 5 m" in dataset.failed_rows[0][2]
     lost, kept = dataset.isel(posture=1), dataset.isel(posture=0)
     for name, variable in lost.data_vars.items():
         if "posture" in dataset[name].dims and variable.dtype.kind == "f":
@@ -151,7 +151,7 @@ def test_a_posture_out_of_reach_is_a_row_with_its_reason_and_no_numbers(icub):
 
 def test_a_sweep_that_fails_everywhere_is_still_a_dataset(icub):
     dataset = copsense.sweep(copsense.lateral_sweep(icub, 5.0, 6.0, 2), [copsense.minimum_torque()])
-    assert len(copsense.failed_rows(dataset)) == 2
+    assert len(dataset.failed_rows) == 2
 
 
 def test_a_list_of_configurations_is_checked_one_by_one(icub):
@@ -173,8 +173,8 @@ def test_a_joint_of_any_name_can_be_swept_and_stored(name, tmp_path):
     path = copsense.joint_sweep(stance, name, 0.0, 0.0, 2)
     dataset = copsense.sweep(path, [copsense.minimum_wrench(1.0)])
     for suffix in (".nc", ".csv"):
-        copsense.write_results(dataset, tmp_path / f"swept{suffix}")
-    back = copsense.load_results(tmp_path / "swept.nc")
+        dataset.save(tmp_path / f"swept{suffix}")
+    back = copsense.Sweep.load(tmp_path / "swept.nc")
     assert list(back["contact"].values) == ["left", "right"]
     assert back["com"].dims == ("posture", "com_axis")
     np.testing.assert_array_equal(back[back.attrs["coordinate"]], path.values)

@@ -9,8 +9,7 @@ import copsense
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.margins import limit_margins
 from copsense.plots import plot_limit_margins, render_figure
-from copsense.plots.limits import first_limits
-from copsense.recorded import with_limit_margins
+from copsense.plots.limit_plots import first_limits
 
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 LIMITS = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torque="model")
@@ -19,15 +18,15 @@ LIMITS = copsense.Limits(normal_force=10.0, friction=1 / 3, torsion=1 / 75, torq
 def recorded(stance, tmp_path, ends=(-0.05, 0.05), limits=None):
     path = copsense.lateral_sweep(stance, *ends, 5)
     dataset = copsense.sweep(path, CRITERIA, limits)
-    file = copsense.write_results(dataset, tmp_path / "sweep.nc")
-    return path, copsense.load_results(file)
+    file = dataset.save(tmp_path / "sweep.nc")
+    return path, copsense.Sweep.load(file)
 
 
 @pytest.mark.parametrize("robot", ["icub", "talos", "solo12", "four_bar"])
 def test_margins_from_the_file_are_those_of_the_equilibria(stance_of, robot, tmp_path):
     path, dataset = recorded(stance_of(robot), tmp_path)
     limits = copsense.Limits(friction=0.4, torque="model")
-    found = with_limit_margins(dataset, limits)
+    found = dataset.with_limit_margins(limits)
     for i, here in enumerate(path.stances):
         for j, criterion in enumerate(CRITERIA):
             margins = limit_margins(copsense.solve_equilibrium(here, criterion), limits)
@@ -44,7 +43,7 @@ def test_contacts_keep_their_own_coefficients_and_soles(icub, tmp_path):
         [replace(left, friction=0.3, torsional_friction=0.02), replace(right, polygon=None)]
     )
     _, dataset = recorded(stance, tmp_path, (-0.01, 0.01))
-    found = with_limit_margins(dataset, copsense.Limits(normal_force=0.0))
+    found = dataset.with_limit_margins(copsense.Limits(normal_force=0.0))
     assert found["limit"].values.tolist() == [
         "l_sole: normal force",
         "l_sole: friction",
@@ -56,8 +55,8 @@ def test_contacts_keep_their_own_coefficients_and_soles(icub, tmp_path):
 
 def test_a_failed_row_has_no_margin_and_a_pulling_contact_no_distance_to_an_edge(icub, tmp_path):
     _, dataset = recorded(icub, tmp_path, (0.0, 0.9))
-    assert copsense.failed_rows(dataset)
-    found = with_limit_margins(dataset, LIMITS)
+    assert dataset.failed_rows
+    found = dataset.with_limit_margins(LIMITS)
     failed = dataset["reason"].values != ""
     np.testing.assert_array_equal(np.isnan(found["limit_margin"].values).all(-1), failed)
     pulling = dataset["pulling"].values & ~failed[..., None]
@@ -69,7 +68,7 @@ def test_a_failed_row_has_no_margin_and_a_pulling_contact_no_distance_to_an_edge
 
 def test_other_limits_replace_those_before(icub, tmp_path):
     _, dataset = recorded(icub, tmp_path, limits=LIMITS)
-    twice = with_limit_margins(with_limit_margins(dataset, LIMITS), copsense.Limits())
+    twice = dataset.with_limit_margins(LIMITS).with_limit_margins(copsense.Limits())
     assert set(twice["limit_kind"].values) == {"normal force", "cop"}
 
 
@@ -77,7 +76,7 @@ def test_the_first_limit_is_marked_where_the_path_meets_it(icub):
     path = copsense.lateral_sweep(icub, -0.06, 0.06, 61)
     exact = {c.name: copsense.limit_travel(icub, c, LIMITS).first.exact for c in CRITERIA}
     for limits in (None, LIMITS):  # unclipped it is interpolated, clipped extrapolated
-        found = with_limit_margins(copsense.sweep(path, CRITERIA, limits), LIMITS)
+        found = copsense.sweep(path, CRITERIA, limits).with_limit_margins(LIMITS)
         for j, criterion in enumerate(CRITERIA):
             low, high = (np.interp(at, np.arange(61), path.values) for at in first_limits(found, j))
             assert high == pytest.approx(exact[criterion.name], abs=1e-4)
@@ -88,8 +87,8 @@ def test_the_first_limit_is_marked_where_the_path_meets_it(icub):
 def test_what_the_file_does_not_tell_is_said(icub, tmp_path):
     _, dataset = recorded(icub, tmp_path)
     with pytest.raises(InvalidInputError, match="an earlier version"):
-        with_limit_margins(dataset.drop_vars("torque_limit"), LIMITS)
+        copsense.Sweep(dataset.to_xarray().drop_vars("torque_limit")).with_limit_margins(LIMITS)
     with pytest.raises(UnknownNameError, match="l_knee"):
-        with_limit_margins(dataset, copsense.Limits(torque={"l_kne": 3.0}))
-    by_joint = with_limit_margins(dataset, copsense.Limits(torque={"l_knee": 3.0}))
+        dataset.with_limit_margins(copsense.Limits(torque={"l_kne": 3.0}))
+    by_joint = dataset.with_limit_margins(copsense.Limits(torque={"l_knee": 3.0}))
     assert by_joint["limit"].values[-1] == "l_knee: torque"

@@ -63,9 +63,9 @@ def swept(path):
 
 
 def test_dimensions_and_units_are_as_documented(swept):
-    assert {name: v.dims for name, v in swept.data_vars.items()} == DIMENSIONS
+    assert {n: v.dims for n, v in swept.to_xarray().data_vars.items()} == DIMENSIONS
     assert {name: swept[name].attrs["units"] for name in UNITS} == UNITS
-    for name, variable in swept.data_vars.items():
+    for name, variable in swept.to_xarray().data_vars.items():
         assert variable.attrs["long_name"], name
 
 
@@ -87,7 +87,7 @@ def test_labels_are_the_robots(swept, icub):
 def test_every_row_is_the_postures_own_result(swept, path):
     for i, (stance, tangent) in enumerate(zip(path.stances, path.tangents, strict=True)):
         for criterion in (WRENCH, TORQUE):
-            row = swept.isel(posture=i).sel(criterion=criterion.name)
+            row = swept.sel(posture=i, criterion=criterion.name)
             found = copsense.cop_sensitivity(stance, criterion)
             expected = {
                 "cop": found.cop,
@@ -123,7 +123,7 @@ def test_slope_along_the_path_is_the_difference_of_its_rows(icub):
 def test_a_posture_that_failed_is_a_row_with_its_reason(icub):
     path = copsense.lateral_sweep(icub, 0.0, 0.6, 3)
     swept = copsense.sweep(path, [WRENCH, TORQUE])
-    failed = copsense.failed_rows(swept)
+    failed = swept.failed_rows
     assert [(i, name) for i, name, _ in failed] == [(2, "minimum-wrench"), (2, "minimum-torque")]
     assert all("CoM y = 0.6 m" in reason for _, _, reason in failed)
     assert np.isnan(swept["cop"].values[2]).all()
@@ -136,9 +136,9 @@ def test_a_posture_that_failed_is_a_row_with_its_reason(icub):
 def test_a_criterion_that_failed_leaves_the_others_rows(path, icub):
     open_ended = copsense.Criterion("vertical", (copsense.WrenchTerm([0, 0, 1, 0, 0, 0]),))
     swept = copsense.sweep(path, [WRENCH, open_ended])
-    reasons = dict.fromkeys(name for _, name, _ in copsense.failed_rows(swept))
+    reasons = dict.fromkeys(name for _, name, _ in swept.failed_rows)
     assert list(reasons) == ["vertical"]
-    assert len(copsense.failed_rows(swept)) == 5
+    assert len(swept.failed_rows) == 5
     assert "tie_break" in str(swept["reason"].sel(criterion="vertical").values[0])
     assert np.isfinite(swept["cop"].sel(criterion="minimum-wrench").values).all()
 

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.polygon import EdgeMargin, Polygon
     from copsense.posture import Posture, PostureCost, retract, solve_posture
-    from copsense.recorded import with_limit_margins
     from copsense.regions import ComRegion, com_region, com_regions, criterion_region
     from copsense.robot import Robot
     from copsense.robots import (
@@ -63,6 +62,7 @@ if TYPE_CHECKING:
         cop_sensitivity,
         finite_difference_sensitivity,
     )
+    from copsense.simulation import Recording, balance
     from copsense.sole import Sole, read_sole
     from copsense.stance import Stance
     from copsense.statics import (
@@ -71,8 +71,7 @@ if TYPE_CHECKING:
         solve_equilibrium,
         wrench_policy,
     )
-    from copsense.storage import load_results, write_results
-    from copsense.sweeps import failed_rows, sweep
+    from copsense.sweeps import Sweep, sweep
 
 __all__ = [
     "CRITERIA",
@@ -95,15 +94,18 @@ __all__ = [
     "Posture",
     "PostureCost",
     "PosturePath",
+    "Recording",
     "Robot",
     "Sample",
     "Sole",
     "Stance",
     "StaticEquilibrium",
+    "Sweep",
     "TorqueTerm",
     "WrenchTerm",
     "__version__",
     "analyse",
+    "balance",
     "center_of_pressure",
     "check_sensitivity",
     "com_projection",
@@ -114,7 +116,6 @@ __all__ = [
     "criterion_named",
     "criterion_region",
     "design_criterion",
-    "failed_rows",
     "families",
     "finite_difference_sensitivity",
     "foot_rotation_indicator",
@@ -125,7 +126,6 @@ __all__ = [
     "limit_margins",
     "limit_travel",
     "load_map",
-    "load_results",
     "load_robot",
     "load_stance",
     "map_postures",
@@ -147,9 +147,7 @@ __all__ = [
     "sweep",
     "total_center_of_pressure",
     "weighted_torque",
-    "with_limit_margins",
     "wrench_policy",
-    "write_results",
     "zero_moment_point",
 ]
 
@@ -221,7 +219,6 @@ _HOMES = {
         "retract",
         "solve_posture",
     ),
-    "copsense.recorded": ("with_limit_margins",),
     "copsense.regions": (
         "ComRegion",
         "com_region",
@@ -244,6 +241,7 @@ _HOMES = {
         "cop_sensitivity",
         "finite_difference_sensitivity",
     ),
+    "copsense.simulation": ("Recording", "balance"),
     "copsense.sole": (
         "Sole",
         "read_sole",
@@ -255,12 +253,8 @@ _HOMES = {
         "solve_equilibrium",
         "wrench_policy",
     ),
-    "copsense.storage": (
-        "load_results",
-        "write_results",
-    ),
     "copsense.sweeps": (
-        "failed_rows",
+        "Sweep",
         "sweep",
     ),
 }

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from copsense.arrays import array_property
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
 from copsense.stance import Stance
 
@@ -113,32 +115,32 @@ class LimitRows:
     torque: Float[np.ndarray, " n"]
     joints: tuple[str, ...]
 
-    @property
+    @array_property
     def joint(self) -> Int[np.ndarray, " k"]:
         """Joint of each torque row (k,): two rows, s tau <= t, for each joint with a limit."""
         return np.repeat(np.flatnonzero(np.isfinite(self.torque)), 2)
 
-    @property
+    @array_property
     def sign(self) -> Float[np.ndarray, " k"]:
         """The sign s of each torque row (k,): +1, -1 in turn."""
         return np.tile([1.0, -1.0], len(self.joint) // 2)
 
-    @property
+    @cached_property
     def torque_names(self) -> tuple[str, ...]:
         """What each torque row limits (k,)."""
         return tuple(f"torque of {self.joints[i]}" for i in self.joint)
 
     def over_forces(
-        self, stance: Stance
+        self, problem: LoadProblem
     ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:
-        """A and b of A f <= b with the torque rows after the contacts': tau = G_j - J_j' f.
+        """A and b of A f <= b with the torque rows after the contacts': tau = tau_0 - J' f.
 
-        s tau_i <= t_i is the row -s J_i' f <= t_i - s G_i.
+        s tau_i <= t_i is the row -s J_i' f <= t_i - s tau_0i.
         """
-        nb, joint, s = stance.robot.base_nv, self.joint, self.sign
-        Jj, Gj = stance.jacobian[:, nb:].T[joint], stance.gravity[nb:][joint]
-        A = np.vstack([self.matrix, -s[:, None] * Jj])
-        return A, np.concatenate([self.bound, self.torque[joint] - s * Gj])
+        joint, s = self.joint, self.sign
+        A = np.vstack([self.matrix, -s[:, None] * problem.joint_map[joint]])
+        bound = self.torque[joint] - s * problem.torque_offset[joint]
+        return A, np.concatenate([self.bound, bound])
 
 
 def limit_rows(stance: Stance, limits: Limits) -> LimitRows:

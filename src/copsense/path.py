@@ -175,7 +175,7 @@ def path_through(
     tangents = np.zeros((len(stances), stance.robot.model.nv))
     for i, here in enumerate(stances):
         a, b = max(i - 1, 0), min(i + 1, last)
-        # A neighbour that failed is no neighbour.
+        # A posture that failed is not used as a neighbour.
         a, b = (i if a in failures else a), (i if b in failures else b)
         secant = pin.difference(stance.robot.model, stances[a].q, stances[b].q) / max(b - a, 1)
         basis = here.admissible_motions

@@ -36,7 +36,7 @@ class PostureCost:
     free: float = 20.0
 
     def __post_init__(self) -> None:
-        """Refuse a weight that would leave a joint undetermined."""
+        """Reject a weight that would leave a joint undetermined."""
         for name in ("base_rotation", "supporting", "free"):
             finite_number(getattr(self, name), f"the posture weight {name}", positive=True)
 

@@ -1,67 +1,226 @@
-"""Sweep: many postures and criteria into one labelled dataset; a failure is a row."""
+"""sweep: many postures and criteria into one labelled result; a failure is a row."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
-from typing import Any
+import json
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import xarray as xr
 
-from copsense._version import __version__
-from copsense.contact import COMPONENT_NAMES
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
-from copsense.limits import Limits, torque_limits
+from copsense.labelled import LabelledResult, tidy_table
+from copsense.limits import Limits
 from copsense.path import PosturePath
-from copsense.polygon import padded
+from copsense.provenance import made_by
+from copsense.recorded import with_limit_margins
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
-from copsense.stance import Stance
 from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
+from copsense.sweep_layout import SweepRows, sweep_dataset
 
-# name -> (dimensions after posture and criterion, unit, what it is)
-_PER_CRITERION: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "cop": (("contact", "axis"), "m", "centre of pressure, contact axes"),
-    "wrench": (
-        ("contact", "component"),
-        "N, N m",
-        "wrench of the environment on the robot about the contact frame's origin, contact axes",
-    ),
-    "torque": (("joint",), "N m", "joint torque (force for a prismatic joint)"),
-    "cop_sensitivity": (
-        ("contact", "axis", "velocity"),
-        "m/rad, m/m",
-        "gradient of the centre of pressure over velocities, projected on the admissible motions",
-    ),
-    "cop_slope": (
-        ("contact", "axis"),
-        "m per unit of the path's coordinate",
-        "derivative of the centre of pressure along the path",
-    ),
-    "cop_gain": (
-        ("contact", "axis", "com_direction"),
-        "1",
-        "centre of pressure (contact axes) per centre of mass (world x, y)",
-    ),
-    "worst_case_gain": (("contact",), "1", "largest gain over motions of equal kinetic energy"),
-    "com_travel": (
-        ("contact",),
-        "m",
-        "first-order distance the centre of mass may move before the contact tips",
-    ),
-    "unloading_travel": (
-        ("contact",),
-        "m",
-        "first-order distance the centre of mass may move before the contact carries no load",
-    ),
-    "margin": (
-        ("contact",),
-        "m",
-        "signed distance of the centre of pressure to the sole's nearest edge, positive inside",
-    ),
-    "residual": ((), "N, N m", "largest imbalance, recomputed by inverse dynamics"),
-}
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+ON_EDGE = 1e-9  # m: a centre of pressure this near to its sole's edge is on it, and on the sole
+_SHOWN = 5  # criteria, and contacts, that the representation lists
+_COLUMNS = (
+    "com",
+    "cop",
+    "wrench",
+    "margin",
+    "margin_side",
+    "com_travel",
+    "unloading_travel",
+    "cop_gain",
+    "cop_slope",
+    "worst_case_gain",
+    "pulling",
+    "residual",
+    "reason",
+    "torque",
+    "cop_sensitivity",
+)
+
+
+class Sweep(LabelledResult):
+    """What `sweep` found: every criterion at every posture of a path.
+
+    ``sweep["cop_slope"]`` is a labelled array; the dimensions are ``posture, criterion, contact,
+    axis, component, joint, velocity, com_direction, com_axis, vertex``, and within limits
+    ``limit``. Every variable carries unit and meaning. A row that failed has NaN and its reason in
+    ``reason``; elsewhere ``reason`` is empty.
+    """
+
+    _needs: ClassVar = ("cop", "wrench", "torque", "com", "reason", "pulling", "margin")
+    _needs_attributes: ClassVar = ("coordinate",)
+    _what: ClassVar = "a sweep"
+    _made_by: ClassVar = "copsense.sweep"
+    _command: ClassVar = "copsense sweep ... --output FILE.nc"
+
+    __slots__ = ()
+
+    @property
+    def coordinate(self) -> xr.DataArray:
+        """The path's coordinate at every posture, with its unit."""
+        return self[str(self.attrs["coordinate"])]
+
+    @property
+    def criteria(self) -> tuple[Mapping[str, Any], ...]:
+        """What was minimised, as plain data; of a policy its name alone.
+
+        Empty for a file of an earlier version, which did not record it.
+        """
+        return tuple(json.loads(self.attrs.get("criteria", "[]")))
+
+    @property
+    def limits(self) -> Limits | None:
+        """The limits within which the wrenches were solved; None for none."""
+        found = json.loads(self.attrs.get("limits", "null"))
+        if found is None:
+            return None
+        del found["is"]
+        return Limits(**found | {"friction_sides": int(found["friction_sides"])})
+
+    @property
+    def planted(self) -> xr.DataArray:
+        """Whether each contact pushes with its CoP on its sole, the edge included.
+
+        Over posture, criterion and contact. A CoP within `ON_EDGE` of the edge is on it: a limit
+        holds it there. A contact without a sole is planted where it pushes; a failed row is not.
+        """
+        return (self["margin"] > -ON_EDGE) & ~self["pulling"]
+
+    @property
+    def free(self) -> xr.DataArray:
+        """Whether no limit is active, over posture and criterion; where there are none, true.
+
+        False where the row failed.
+        """
+        solved = self["reason"] == ""
+        return solved & (self["active_limits"] == "") if "active_limits" in self else solved
+
+    @property
+    def planted_range(self) -> dict[str, tuple[float, float] | None]:
+        """Criterion -> the longest part of the path on which every contact is planted.
+
+        Ends in the unit of `coordinate`, the lower first; None where no posture is.
+        """
+        return self._longest(self.planted.all("contact"))
+
+    @property
+    def free_range(self) -> dict[str, tuple[float, float] | None]:
+        """Criterion -> the longest part of the path on which no limit is active, likewise."""
+        return self._longest(self.free)
+
+    @property
+    def failed(self) -> xr.DataArray:
+        """Whether each row failed, over posture and criterion."""
+        return self["reason"] != ""
+
+    @property
+    def failed_rows(self) -> tuple[tuple[int, str, str], ...]:
+        """Posture, criterion and reason of every row that failed."""
+        reasons, names = self["reason"].values, self.labels("criterion")
+        return tuple((int(i), names[j], str(reasons[i, j])) for i, j in np.argwhere(reasons != ""))
+
+    def subset(
+        self, criteria: Sequence[str] | None = None, postures: Sequence[int] | None = None
+    ) -> Sweep:
+        """The sweep of some criteria, in the order given, and of some postures by position."""
+        found = self._dataset
+        if criteria is not None:
+            found = found.sel(criterion=list(criteria))
+            if self.criteria:
+                known = dict(zip(self.labels("criterion"), self.criteria, strict=True))
+                kept = json.dumps([known[name] for name in criteria])
+                found = found.assign_attrs(criteria=kept)
+        if postures is not None:
+            found = found.isel(posture=np.asarray(postures, dtype=int))
+        return Sweep(found)
+
+    def with_limit_margins(self, limits: Limits) -> Sweep:
+        """The sweep with the margins of its wrenches and torques to other limits.
+
+        A sweep within limits has the margins to them already. The wrenches stay what they are.
+
+        Returns:
+            A sweep with ``limit_margin`` (posture, criterion, limit), negative beyond the limit,
+            and ``limit_kind`` and ``limit_unit`` of each. NaN where a row failed, and to the sole's
+            edge where a contact pulls and has no centre of pressure.
+
+        Raises:
+            InvalidInputError: a limit needs what the contacts do not have.
+            UnknownNameError: a torque limit names no joint.
+        """
+        return Sweep(with_limit_margins(self.to_xarray(), limits))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A tidy table: a row per posture, criterion and contact."""
+        first = ("posture", str(self.attrs["coordinate"]), "criterion", "contact")
+        return tidy_table(self._dataset, ("posture", "criterion", "contact"), first, _COLUMNS)
+
+    def plot(self) -> Figure:
+        """The sweep in one figure, `copsense.plots.plot_results`."""
+        from copsense.plots import plot_results
+
+        return plot_results(self)
+
+    def __repr__(self) -> str:
+        """Robot, path, and over which part of it each criterion keeps every contact planted."""
+        return "\n".join([f"<copsense.Sweep of {self._heading()}", *self._lines()]) + ">"
+
+    def _repr_html_(self) -> str:
+        """The same with xarray's own view folded away, for notebooks."""
+        lines = "".join(f"<div>{escape(line)}</div>" for line in self._lines())
+        return (
+            f"<div><strong>Sweep of {escape(self._heading())}</strong>{lines}"
+            f"<details><summary>dataset</summary>{self._dataset._repr_html_()}</details></div>"
+        )
+
+    def _heading(self) -> str:
+        along = self.coordinate
+        ends = f"{float(along[0]):g} to {float(along[-1]):g} {along.attrs.get('units', '')}"
+        count = self.sizes["posture"]
+        return (
+            f"{self.attrs['robot']}: {count} posture{'s' * (count != 1)} along {along.name}, "
+            f"{ends.strip()}"
+        )
+
+    def _lines(self) -> list[str]:
+        """What the representation says under its heading."""
+        contacts, names = self.labels("contact"), self.labels("criterion")
+        unit = self.coordinate.attrs.get("units", "")
+        lines = [f"  contacts: {_listed(contacts)}"]
+        word, ranges = "every contact planted", self.planted_range
+        if self.limits is not None:
+            lines.append(f"  within {self.limits}")
+            word, ranges = "no limit active", self.free_range
+        for name in names[:_SHOWN]:
+            ends = ranges[name]
+            part = "at no posture" if ends is None else f"from {ends[0]:g} to {ends[1]:g} {unit}"
+            lines.append(f"  {name}: {word} {part.strip()}")
+        if len(names) > _SHOWN:
+            lines.append(f"  and {len(names) - _SHOWN} more criteria")
+        failed = self.failed_rows
+        if failed:
+            posture, name, reason = failed[0]
+            lines.append(f"  {len(failed)} rows failed; posture {posture}, {name}: {reason[:60]}")
+        return lines
+
+    def _longest(self, flags: xr.DataArray) -> dict[str, tuple[float, float] | None]:
+        values = self.coordinate.values
+        found: dict[str, tuple[float, float] | None] = {}
+        for name, column in zip(self.labels("criterion"), flags.values.T, strict=True):
+            run = _longest_run(column)
+            found[name] = None
+            if run is not None:
+                low, high = sorted(float(values[i]) for i in run)
+                found[name] = (low, high)
+        return found
 
 
 def sweep(
@@ -70,25 +229,48 @@ def sweep(
     limits: Limits | None = None,
     *,
     progress: Callable[[int], object] | None = None,
-) -> xr.Dataset:
+) -> Sweep:
     """Evaluate every criterion at every posture of a path.
 
     Args:
         path: the postures and their tangents.
-        criteria: criteria with distinct names, or laws q -> wrenches (named by their function).
+        criteria: criteria with distinct names, or policies q -> wrenches (named by their function).
         limits: what the wrenches and torques must respect; None for nothing. The active ones of
-            each row are then named in ``active_limits``, separated by semicolons.
+            each row are then named in ``active_limits``, separated by semicolons, and every row has
+            its margins to them in ``limit_margin``.
         progress: called with 1 after each posture.
 
     Returns:
-        A dataset with dimensions ``posture, criterion, contact, axis, component, joint, velocity,
-        com_direction, com_axis, vertex``. Its variables carry unit and meaning in their
-        attributes. A row that failed has NaN values and its reason in ``reason``; elsewhere
-        ``reason`` is empty.
+        The sweep. A row that failed has NaN and its reason.
 
     Raises:
-        InvalidInputError: no criterion, or two of one name.
+        InvalidInputError: there is no criterion, two have one name, or a policy is given with
+            limits, within which only a criterion can be solved.
     """
+    names = _names(criteria, limits)
+    rows = SweepRows(path.stances[0], len(path), names)
+    for i, here in enumerate(path.stances):
+        for j, criterion in enumerate(criteria):
+            if i in path.failures:
+                rows.reason[i, j] = path.failures[i]
+                continue
+            try:
+                _fill(rows, (i, j), cop_sensitivity(here, criterion, limits), path.tangents[i])
+            except CopsenseError as error:
+                rows.reason[i, j] = str(error)
+        if progress:
+            progress(1)
+    dataset = sweep_dataset(path, rows, made_by(path.stances[0], criteria, limits))
+    if limits is not None:
+        meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
+        dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
+        if limits.any:
+            dataset = with_limit_margins(dataset, limits)
+    return Sweep(dataset)
+
+
+def _names(criteria: Sequence[Criterion | WrenchPolicy], limits: Limits | None) -> list[str]:
+    """The names of the criteria, checked."""
     if isinstance(criteria, Criterion):
         raise InvalidInputError("criteria is a single criterion. Give a list of them.")
     names = [str(c.name) if isinstance(c, Criterion) else policy_name(c) for c in criteria]
@@ -97,214 +279,63 @@ def sweep(
             f"a sweep needs criteria of distinct names, got {', '.join(names) or 'none'}. "
             "Give at least one; Criterion.named(...) renames one."
         )
-    stance, shape = path.stances[0], (len(path), len(names))
-    sizes = _sizes(stance)
-    values = {
-        name: np.full(shape + tuple(sizes[d] for d in dims), np.nan)
-        for name, (dims, _, _) in _PER_CRITERION.items()
+    policies = [n for n, c in zip(names, criteria, strict=True) if not isinstance(c, Criterion)]
+    if limits is not None and policies:
+        raise InvalidInputError(
+            f"{policies[0]} is a policy: its wrenches are what it says, and limits cannot change "
+            "them. Leave the limits out and ask for margins to them with "
+            "sweep(...).with_limit_margins(limits), or give a Criterion."
+        )
+    return names
+
+
+def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, tangent: np.ndarray) -> None:
+    """Enter what one posture and criterion gave."""
+    equilibrium = found.equilibrium
+    margins = _margins(found)
+    values: dict[str, Any] = {
+        "cop": found.cop,
+        "wrench": equilibrium.wrenches,
+        "torque": equilibrium.torques,
+        "cop_sensitivity": found.gradient,
+        "cop_slope": found.gradient @ tangent,
+        "cop_gain": found.com_gain,
+        "worst_case_gain": found.worst_case_gain,
+        "com_travel": found.com_travel,
+        "unloading_travel": found.unloading_travel,
+        "margin": [margin for margin, _ in margins],
+        "residual": equilibrium.residual(),
     }
-    side = np.full((*shape, sizes["contact"]), "", dtype=object)
-    pulling = np.zeros((*shape, sizes["contact"]), dtype=bool)
-    reason = np.full(shape, "", dtype=object)
-    active = np.full(shape, "", dtype=object)
-    for i, here in enumerate(path.stances):
-        for j, criterion in enumerate(criteria):
-            if i in path.failures:
-                reason[i, j] = path.failures[i]
-                continue
-            try:
-                row = cop_sensitivity(here, criterion, limits)
-                if isinstance(row.equilibrium, ConstrainedEquilibrium):
-                    active[i, j] = "; ".join(limit.name for limit in row.equilibrium.active)
-                for name, value in _row(row, path.tangents[i]).items():
-                    values[name][i, j] = value
-                pulling[i, j] = [c in row.equilibrium.pulling for c in here.contact_names]
-                margins = _margins(row)
-                values["margin"][i, j] = [m[0] for m in margins]
-                side[i, j] = [m[1] for m in margins]
-            except CopsenseError as error:
-                reason[i, j] = str(error)
-        if progress:
-            progress(1)
-    dataset = _dataset(path, names, values, side, pulling, reason)
-    if limits is not None:
-        meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
-        dataset["active_limits"] = (("posture", "criterion"), active.astype(str), meaning)
-        dataset.attrs["limits"] = repr(limits)
-    return dataset
+    for name, value in values.items():
+        rows.values[name][at] = value
+    rows.side[at] = [side for _, side in margins]
+    rows.pulling[at] = [c in equilibrium.pulling for c in equilibrium.stance.contact_names]
+    if isinstance(equilibrium, ConstrainedEquilibrium):
+        rows.active[at] = "; ".join(limit.name for limit in equilibrium.active)
 
 
-def failed_rows(dataset: xr.Dataset) -> list[tuple[int, str, str]]:
-    """Posture, criterion and reason of every failed row of a sweep."""
-    reasons = dataset["reason"].values
-    names = [str(n) for n in dataset["criterion"].values]
-    return [(int(i), names[j], str(reasons[i, j])) for i, j in np.argwhere(reasons != "")]
-
-
-def _row(row: CopSensitivity, tangent: np.ndarray) -> dict[str, Any]:
-    return {
-        "cop": row.cop,
-        "wrench": row.equilibrium.wrenches,
-        "torque": row.equilibrium.torques,
-        "cop_sensitivity": row.gradient,
-        "cop_slope": row.gradient @ tangent,
-        "cop_gain": row.com_gain,
-        "worst_case_gain": row.worst_case_gain,
-        "com_travel": row.com_travel,
-        "unloading_travel": row.unloading_travel,
-        "residual": row.equilibrium.residual(),
-    }
-
-
-def _margins(row: CopSensitivity) -> list[tuple[float, str]]:
+def _margins(found: CopSensitivity) -> list[tuple[float, str]]:
     """Margin and side of each contact; a contact without a sole has no edge to reach."""
-    found = []
-    for contact, cop in zip(row.equilibrium.stance.contacts, row.cop, strict=True):
-        if contact.sole:
-            margin = contact.sole.margin(cop)
-            found.append((margin.distance, margin.side))
+    margins = []
+    for contact, cop in zip(found.equilibrium.stance.contacts, found.cop, strict=True):
+        if contact.sole is None:
+            margins.append((np.inf, ""))
         else:
-            found.append((np.inf, ""))
-    return found
+            margin = contact.sole.margin(cop)
+            margins.append((margin.distance, margin.side))
+    return margins
 
 
-def _sizes(stance: Stance) -> dict[str, int]:
-    return {
-        "contact": len(stance.contacts),
-        "axis": 2,
-        "component": 6,
-        "joint": len(stance.robot.torque_names),
-        "velocity": stance.robot.model.nv,
-        "com_direction": 2,
-    }
+def _longest_run(flags: np.ndarray) -> tuple[int, int] | None:
+    """First and last index of the longest run of true values."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    if not len(ends):
+        return None
+    runs = ends.reshape(-1, 2)
+    first, after = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
+    return int(first), int(after) - 1
 
 
-def _dataset(
-    path: PosturePath,
-    names: list[str],
-    values: dict[str, np.ndarray],
-    side: np.ndarray,
-    pulling: np.ndarray,
-    reason: np.ndarray,
-) -> xr.Dataset:
-    stance = path.stances[0]
-    first = ("posture", "criterion")
-    data: dict[str, Any] = {
-        name: ((*first, *dims), values[name], {"units": unit, "long_name": meaning})
-        for name, (dims, unit, meaning) in _PER_CRITERION.items()
-    }
-    data["margin_side"] = ((*first, "contact"), side.astype(str), {"long_name": "side of the edge"})
-    data["pulling"] = (
-        (*first, "contact"),
-        pulling,
-        {"long_name": "the contact would have to pull"},
-    )
-    data["reason"] = (first, reason.astype(str), {"long_name": "why the row failed; empty if not"})
-    # A posture that was not reached has no centre of mass, no configuration and no tangent.
-    coms = np.array([s.com for s in path.stances])
-    configurations = np.array([s.q for s in path.stances])
-    tangents = np.array(path.tangents)
-    excess = np.array([s.joint_limit_excess for s in path.stances])
-    for values_of in (coms, configurations, tangents, excess):
-        values_of[list(path.failures)] = np.nan
-    data["com"] = (
-        ("posture", "com_axis"),
-        coms,
-        {"units": "m", "long_name": "centre of mass, world axes"},
-    )
-    data["configuration"] = (
-        ("posture", "configuration_index"),
-        configurations,
-        {"long_name": "base position, quaternion (x, y, z, w), joints", "units": "m, 1, rad"},
-    )
-    data["tangent"] = (
-        ("posture", "velocity"),
-        tangents,
-        {"long_name": f"d configuration / d {path.coordinate}, base in its own frame"},
-    )
-    data["joint_limit_excess"] = (
-        ("posture", "joint"),
-        excess,
-        {"units": "rad, m", "long_name": "how far the joint is beyond the model's limits"},
-    )
-    places = stance.placements
-    data["contact_position"] = (
-        ("contact", "com_axis"),
-        np.array([p.translation for p in places]),
-        {"units": "m", "long_name": "origin of the contact frame, world axes"},
-    )
-    data["contact_rotation"] = (
-        ("contact", "com_axis", "contact_axis"),
-        np.array([p.rotation for p in places]),
-        {"units": "1", "long_name": "columns: contact axes in world axes"},
-    )
-    for name, values_of_contacts, unit, meaning in (
-        ("friction", [c.friction for c in stance.contacts], "1", "Coulomb coefficient"),
-        ("torsional_friction", [c.torsional_friction for c in stance.contacts], "m", "torsional"),
-    ):
-        data[name] = (
-            "contact",
-            np.array(values_of_contacts, dtype=float),
-            {"units": unit, "long_name": f"{meaning} of the contact; NaN where it gives none"},
-        )
-    torque = torque_limits(stance, "model")
-    data["torque_limit"] = (
-        "joint",
-        np.where(np.isfinite(torque), torque, np.nan),
-        {"units": "N m", "long_name": "effort limit of the model; NaN where it has none"},
-    )
-    soles = [c.sole for c in stance.contacts]
-    if any(soles):
-        data["sole_polygon"] = (
-            ("contact", "vertex", "axis"),
-            padded(soles),
-            {
-                "units": "m",
-                "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",
-            },
-        )
-    coordinates: dict[str, Any] = {
-        "posture": np.arange(len(path)),
-        "criterion": names,
-        "contact": list(stance.contact_names),
-        "axis": ["x", "y"],
-        "com_axis": ["x", "y", "z"],
-        "contact_axis": ["x", "y", "z"],
-        "com_direction": ["x", "y"],
-        "component": list(COMPONENT_NAMES),
-        "joint": list(stance.robot.torque_names),
-        "velocity": list(stance.robot.velocity_names),
-    }
-    taken = {*data, *coordinates, *(d for dims, *_ in data.values() for d in dims)}
-    coordinate = variable_name(path.coordinate, taken)
-    coordinates[coordinate] = (
-        "posture",
-        path.values,
-        {"units": path.unit, "long_name": f"{path.coordinate}, the coordinate of the path"},
-    )
-    attributes = {
-        "title": f"Static centre-of-pressure sensitivity of {stance.robot.name}",
-        "source": f"copsense {__version__}",
-        "robot": stance.robot.name,
-        "mass": stance.robot.mass,
-        "weight": stance.robot.weight,
-        "coordinate": coordinate,
-        "contact_frames": ", ".join(c.frame for c in stance.contacts),
-        "contact_kinds": ", ".join(c.kind for c in stance.contacts),
-        "without_sole": ", ".join(
-            c.name for c in stance.contacts if c.kind != "point" and c.sole is None
-        ),
-        "conventions": "SI units, radians, world z up; wrenches are what the environment does to "
-        "the robot, force first; base velocity in the base's frame",
-    }
-    return xr.Dataset(data, coordinates, attributes)
-
-
-def variable_name(name: str, taken: set[str]) -> str:
-    """A name that netCDF allows and no other variable has: a joint may be called anything."""
-    plain = re.sub(r"[^\w.-]", "_", name)
-    if not (plain[0].isalnum() or plain[0] == "_"):
-        plain = f"_{plain}"
-    while plain in taken:
-        plain += "_"
-    return plain
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.commands import copsense
 
-from copsense.storage import load_configurations
+from copsense.files import load_configurations
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):
     assert "tip excursion [mm]" in answer.out
     assert "statics" in answer.out
     assert "ranking over 1 case" in answer.out
-    assert "holds the theory against physics" in answer.out
+    assert "compares theory with physics" in answer.out
     assert picture.stat().st_size > 10_000
     assert len(load_benchmark(table)) == 1
     again = copsense("benchmark", "--plan", plan, "--output", table, "--plot", picture, "--json")
@@ -82,7 +82,7 @@ def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):
     assert found["failed"] == 0
     assert found["scores"][0]["contact"] == "r_sole"
     assert found["agreement"][0]["cases"] == 1
-    assert "share the law" in found["caveat"]
+    assert "use the same criterion" in found["caveat"]
 
 
 def test_a_failed_run_makes_the_exit_code_one(tmp_path):
@@ -110,7 +110,7 @@ def test_a_picture_shows_bounds_failures_and_predictions():
     ]  # fmt: skip
     figure = plot_benchmark(pd.DataFrame(rows))
     assert len(figure.axes) == 4
-    assert "share the law" in figure.legends[0].get_title().get_text()
+    assert "use the same criterion" in figure.legends[0].get_title().get_text()
     said = [text.get_text() for ax in figure.axes for text in ax.texts]
     assert " ≥ 70" in said
     assert " × failed" in said

@@ -253,7 +253,7 @@ def test_the_legs_are_between_the_base_and_the_contacts():
         ("lean", {"side": "up"}, "up"),
         ("lean", {"parameter": "delay"}, "parameter"),
         ("push", {"resolution": -1}, "resolution"),
-        ("delay", {"mild": 0.05, "severe": 0.0}, "gets no worse"),
+        ("delay", {"mild": 0.05, "severe": 0.0}, "does not get worse"),
         ("delay", {"mild": -1.0}, "0 or more"),
         ("bandwidth", {"severe": -5.0}, "over 0"),
         ("bandwidth", {"severe": 60.0}, "severe under mild"),

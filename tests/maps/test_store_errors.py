@@ -10,6 +10,7 @@ import zarr
 import copsense
 from copsense.errors import OutputError
 from copsense.maps import Sample
+from copsense.maps.store import open_map
 
 
 def _snapshot(path):
@@ -21,6 +22,7 @@ def test_other_parameters_are_rejected_with_what_differs(whole, icub, both, samp
     other = Sample(sample.axes, len(sample), seed=4)
     for changed, word in [
         ({"sampling": other}, r"sampling.seed is 3 there, 4 here"),
+        ({"sampling": Sample(sample.axes, 300, seed=3 + 2**70)}, r"sampling.seed is 3 there"),
         ({"chunk": 64}, r"chunk is 32 there, 64 here"),
         ({"limits": copsense.Limits()}, r"limits is null there"),
         ({"criteria": both[:1]}, r'criteria is \["minimum-wrench", "minimum-torque"\] there'),
@@ -44,6 +46,11 @@ def test_another_robot_or_posture_is_rejected(whole, icub, both, sample, stance_
         copsense.map_postures(
             copsense.Stance(robot, icub.q, icub.contacts), sample, both, whole[0], chunk=32
         )
+
+
+def test_a_store_holds_its_criteria(whole, both):
+    stored = open_map(whole[0]).parameters["criteria"]
+    assert [copsense.Criterion.from_dict(c) for c in stored] == both
 
 
 @pytest.mark.parametrize("what", ["file", "folder", "zarr", "broken"])

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from support.commands import copsense
 
-from copsense.storage import load_recording
+from copsense.simulation import Recording
 
 
 def test_a_run_is_summarised_recorded_and_drawn(tmp_path):
@@ -23,7 +23,7 @@ def test_a_run_is_summarised_recorded_and_drawn(tmp_path):
     assert answer.code == 0, answer.err
     assert "completed" in answer.out
     assert "no contact tipped" in answer.out
-    recording = load_recording(data)
+    recording = Recording.load(data)
     assert recording.attrs["end_kind"] == "completed"
     assert recording.attrs["command"].startswith("copsense balance solo12")
     assert picture.stat().st_size > 10_000
@@ -227,4 +227,4 @@ def test_a_slower_controller_is_called_less_often(tmp_path):
             "balance", "solo12", "--duration", 0.2, "--control-period", period, "--output", data
         )
         assert answer.code == 0, answer.err
-        assert load_recording(data).attrs["control_period"] == period
+        assert Recording.load(data).attrs["control_period"] == period

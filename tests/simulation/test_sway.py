@@ -8,7 +8,7 @@ import pytest
 from support.reproductions import small_reproduction
 
 import copsense
-from copsense.paper.claims import Verdict, evaluate_sway_claims, stretch, tip_travel
+from copsense.paper.claims import Verdict, evaluate_sway_claims, stretch
 from copsense.paper.report import report_figures, write_report
 from copsense.paper.report.closed_loop_section import score_rows, sway_runs
 from copsense.paper.reproduce import LIMITS, sway_in_simulation
@@ -46,8 +46,8 @@ def test_minimum_wrench_tips_on_either_side_near_the_static_prediction(sway):
     for run, side in ((sway.left, 1), (sway.right, -1)):
         predicted = float(run.attrs["static_excursion"])
         assert np.sign(predicted) == side
-        assert abs(tip_travel(run) - predicted) < 2.5e-3
-    assert tip_travel(sway.left) == pytest.approx(-tip_travel(sway.right), abs=2e-4)
+        assert abs(run.tip_travel - predicted) < 2.5e-3
+    assert sway.left.tip_travel == pytest.approx(-sway.right.tip_travel, abs=2e-4)
 
 
 def test_measured_cops_are_the_static_ones_but_for_the_acceleration(sway):

@@ -73,7 +73,7 @@ def analyse(
     are along the contact's axes: x forward, y left, z the normal. In Python: copsense.analyse.
     """
     from copsense.analysis import analyse as analyse_stance
-    from copsense.storage import check_output
+    from copsense.files import check_output
 
     for drawn in filter(None, (picture, regions)):
         check_output(drawn, suffixes=PICTURES, overwrite=force)

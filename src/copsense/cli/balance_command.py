@@ -8,12 +8,15 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.controller_options import controller_options, read_controller
+from copsense.cli.controller_options import (
+    controller_options,
+    read_gains,
+    read_own_controller,
+)
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.disturbance_options import (
     REFERENCES,
@@ -25,6 +28,9 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from copsense.simulation import Recording
 
 
 @click.command(
@@ -101,10 +107,10 @@ def balance(
     static prediction, and whether the robot fell. Exit code 1 where it did not go to the end.
     Ctrl-C ends the run and keeps what was recorded.
     """
-    from copsense.controllers import lateral_reference
-    from copsense.simulation import MujocoSimulator, Scenario, rollout
-    from copsense.simulation.prediction import predict
-    from copsense.storage import check_output, write_recording
+    from copsense.files import check_output
+    from copsense.simulation import Scenario
+    from copsense.simulation import balance as run
+    from copsense.simulation.balance_run import natural_duration
 
     if len(criteria) > 1:
         raise InvalidInputError(
@@ -120,15 +126,10 @@ def balance(
 
         check_output(video, suffixes=(".mp4",), overwrite=force)
         check_video()
-    if controller is not None and limits is not None and not criteria:
-        raise InvalidInputError(
-            "--limits are those of the built-in controller and of the static prediction. Leave "
-            "them out, or name the --criterion that your controller is to be predicted by."
-        )
     (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
-    course, natural = read_signal(reference)
+    course = read_signal(reference)
     scenario = Scenario(
-        natural if duration is None else duration,
+        natural_duration(course) if duration is None else duration,
         course,
         control_period=control_period,
         name=reference,
@@ -136,28 +137,25 @@ def balance(
     )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
     scenario.check_stance(stance)
-    simulator = MujocoSimulator(stance, wrenches=wrenches)
-    scenario.steps_per_control(simulator.time_step)
-    law = read_controller(stance, controller, criterion, gains, gain, allowed)
-    path = lateral_reference(stance, course)
+    own = None if controller is None else read_own_controller(controller, gain, stance)
     total = round(scenario.duration / scenario.control_period)
-    with (
-        progress_bar(total, "balancing", "step") as update,
-        _interrupts() as stop,
-    ):
-        recording = rollout(
-            simulator,
-            law,
-            replace(scenario, reference=path),
+    with progress_bar(total, "balancing", "step") as update, _interrupts() as stop:
+        recording = run(
+            stance,
+            # Of a user's own controller the analysis knows what the user says.
+            criterion if own is None or criteria else None,
+            scenario,
+            limits=allowed,
+            gains=read_gains(gains, gain, stance.robot),
+            controller=own,
             until=until,
+            wrenches=wrenches,
             progress=update,
             stop=stop,
         )
-    if controller is None or criteria:  # of a user's own law the analysis knows nothing
-        recording = predict(path, criterion, allowed).attach(recording)
-    recording.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
+    recording = recording.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
     if output is not None:
-        write_recording(recording, output, overwrite=force)
+        recording.save(output, overwrite=force)
     if picture is not None:
         from copsense.plots import plot_rollout, save_figure
 
@@ -194,39 +192,26 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _summary(recording: Any) -> dict[str, Any]:
+def _summary(recording: Recording) -> dict[str, Any]:
     """What a person wants to know of a run; tracking and torques are those before a tip."""
-    attributes = recording.attrs
-    tip_time = attributes["tip_time"]
-    standing = recording.sel(time=slice(None, tip_time if math.isfinite(tip_time) else None))
-    error = (standing["com"] - standing["com_target"]).sel(com_axis="y").values
-    loaded = standing["margin"].min("time")
-    torque = (standing["torque"] ** 2).sum("joint") ** 0.5
-    tip_y = float(recording["tip_com"].sel(com_axis="y"))
-    start = float(recording["com"].sel(com_axis="y")[0])
+    attributes, end, tip = recording.attrs, recording.end, recording.tip
+    torque = recording.before_first_tip["torque"]
     return {
         "robot": attributes["robot"],
         "controller": attributes["controller"],
-        "end": {
-            "kind": attributes["end_kind"],
-            "reason": attributes["end_reason"],
-            "time": attributes["end_time"],
-        },
-        "com_error_rms": float((error**2).mean() ** 0.5),
-        "com_error_peak": float(abs(error).max()),
-        "smallest_margin": {
-            str(name): float(value)
-            for name, value in zip(loaded["contact"].values, loaded.values, strict=True)
-        },
-        "torque_norm_mean": float(torque.mean()),
-        "torque_peak": float(abs(standing["torque"]).max()),
+        "end": {"kind": end.kind, "reason": end.message, "time": end.time},
+        "com_error_rms": recording.tracking_error,
+        "com_error_peak": recording.tracking_peak,
+        "smallest_margin": recording.smallest_margin,
+        "torque_norm_mean": float(((torque**2).sum("joint") ** 0.5).mean()),
+        "torque_peak": float(abs(torque).max()),
         "first_tip": None
-        if not attributes["tip_kind"]
+        if tip is None
         else {
-            "contact": attributes["tip_contact"],
-            "reason": attributes["tip_reason"],
-            "time": attributes["tip_time"],
-            "com_y_from_start": tip_y - start,
+            "contact": tip.contact,
+            "reason": tip.message,
+            "time": tip.time,
+            "com_y_from_start": recording.tip_travel,
         },
         "static_prediction": {
             "excursion": attributes.get("static_excursion", math.nan),

@@ -102,7 +102,7 @@ def benchmark(
     """
     from copsense.comparison import read_plan, run_benchmark
     from copsense.comparison.benchmark_run import check_plan, finished_scores
-    from copsense.storage import check_output
+    from copsense.files import check_output
 
     if importlib.util.find_spec("mujoco") is None:
         raise MissingExtraError("mujoco", "sim", "a benchmark in closed loop")

@@ -14,8 +14,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.controllers import Controller, Gains
-    from copsense.criterion import Criterion
-    from copsense.limits import Limits
+    from copsense.robot import Robot
     from copsense.stance import Stance
 
 
@@ -48,34 +47,28 @@ def controller_options(command: F) -> F:
     return with_options(options[::-1], command)
 
 
-def read_controller(
-    stance: Stance,
-    own: str | None,
-    criterion: Criterion,
-    gains: str,
-    changes: tuple[str, ...],
-    limits: Limits | None,
-) -> Controller:
-    """The user's controller, or the balancing controller with the gains asked for."""
-    from copsense.controllers import STIFF, BalancingController, load_controller, public_gains
+def read_own_controller(source: str, changes: tuple[str, ...], stance: Stance) -> Controller:
+    """The user's controller, ``MODULE:NAME``, which has no gains to set."""
+    from copsense.controllers import load_controller
 
-    if own is not None:
-        source = click.get_current_context().get_parameter_source("gains")
-        if changes or source is ParameterSource.COMMANDLINE:
-            raise InvalidInputError(
-                "--gains and --gain belong to the built-in controller, and --controller names "
-                "yours. Leave one of them out."
-            )
-        return load_controller(own, stance)
-    chosen = _changed(STIFF if gains == "stiff" else public_gains(stance.robot), changes)
-    return BalancingController(stance, criterion, chosen, limits=limits)
+    where = click.get_current_context().get_parameter_source("gains")
+    if changes or where is ParameterSource.COMMANDLINE:
+        raise InvalidInputError(
+            "--gains and --gain belong to the built-in controller, and --controller names "
+            "yours. Leave one of them out."
+        )
+    return load_controller(source, stance)
 
 
-def _changed(gains: Gains, changes: tuple[str, ...]) -> Gains:
+def read_gains(name: str, changes: tuple[str, ...], robot: Robot) -> Gains:
+    """The set of gains named, with single ones changed."""
+    from copsense.controllers import STIFF, public_gains
+
+    gains = STIFF if name == "stiff" else public_gains(robot)
     values: dict[str, Any] = {}
     names = [f.name.replace("_", "-") for f in fields(gains) if f.name != "scaled_by_inertia"]
-    for name, value in read_assignments(changes, "NAME=VALUE, such as com-damping=14").items():
-        if name not in names:
-            raise UnknownNameError("gain", name, names)
-        values[name.replace("-", "_")] = (value,) * 3 if name.startswith("com-") else value
+    for changed, value in read_assignments(changes, "NAME=VALUE, such as com-damping=14").items():
+        if changed not in names:
+            raise UnknownNameError("gain", changed, names)
+        values[changed.replace("-", "_")] = (value,) * 3 if changed.startswith("com-") else value
     return replace(gains, **values)

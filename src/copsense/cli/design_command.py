@@ -76,9 +76,9 @@ def design(
     its own wrenches, unclipped, meet a limit.
     """
     from copsense.design import design_criterion, families
+    from copsense.files import check_output
     from copsense.limits import Limits
     from copsense.path import lateral_sweep
-    from copsense.storage import check_output
 
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=force)

@@ -106,8 +106,8 @@ def read_disturbances(options: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def read_signal(text: str) -> tuple[Signal, float]:
-    """A reference and how long it naturally lasts [s]."""
+def read_signal(text: str) -> Signal:
+    """A reference: how far the CoM goes."""
     from copsense.controllers import Hold, Ramp, Sine
 
     kind, _, rest = text.partition(":")
@@ -116,13 +116,11 @@ def read_signal(text: str) -> tuple[Signal, float]:
     try:
         numbers = [float(part) for part in rest.split(":")] if rest else []
         if kind == "hold" and not numbers:
-            return Hold(), 2.0
+            return Hold()
         if kind == "sine" and len(numbers) == 2:
-            sine = Sine(*numbers)
-            return sine, 1.0 / sine.frequency
+            return Sine(*numbers)
         if kind == "ramp" and len(numbers) in (1, 2):
-            ramp = Ramp(*numbers)
-            return ramp, ramp.duration + 1.0
+            return Ramp(*numbers)
     except ValueError as error:
         if isinstance(error, InvalidInputError):
             raise

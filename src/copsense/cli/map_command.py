@@ -108,13 +108,13 @@ def map_command(
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
     from copsense.batch import BatchKernel
+    from copsense.files import check_output
     from copsense.maps import MapPlan
     from copsense.maps.heights import height_advice
     from copsense.maps.map_statistics import summarise
     from copsense.maps.mapping import fill_map
     from copsense.maps.sampling import sampling_of
     from copsense.maps.store import check_store
-    from copsense.storage import check_output
 
     check_store(output)
     if plot is not None:

@@ -29,14 +29,14 @@ def plot(file: str, output: str | None, limits: str | None, force: bool) -> None
     With limits, or of a sweep within limits, the margins to them are drawn too, and where each
     criterion meets its first one: to the recorded wrenches, whatever the sweep was evaluated with.
     """
+    from copsense.files import check_output
     from copsense.plots import plot_results, save_figure
-    from copsense.recorded import with_limit_margins
-    from copsense.storage import check_output, load_results
+    from copsense.sweeps import Sweep
 
-    dataset, chosen = load_results(file), read_limits(limits)
+    found, chosen = Sweep.load(file), read_limits(limits)
     if chosen is not None:
-        dataset = with_limit_margins(dataset, chosen)
+        found = found.with_limit_margins(chosen)
     path = Path(file).with_suffix(".png") if output is None else Path(output)
     check_output(path, suffixes=PICTURES, overwrite=force)
-    save_figure(plot_results(dataset), path, overwrite=force)
+    save_figure(plot_results(found), path, overwrite=force)
     echo_written(path)

@@ -1,4 +1,4 @@
-"""``copsense sweep`` and ``copsense plot``: many postures, and their picture."""
+"""``copsense sweep``: many postures and criteria, and a summary of them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from copsense.errors import InvalidInputError
 if TYPE_CHECKING:
     from copsense.path import PosturePath
     from copsense.stance import Stance
+    from copsense.sweeps import Sweep
 
 _OVER_LIMIT = 1e-6  # rad: less is rounding
 
@@ -71,9 +72,7 @@ def sweep(
     ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. A posture that fails is
     a row with its reason, and makes the exit code 1.
     """
-    from copsense.recorded import with_limit_margins
-    from copsense.storage import check_output, write_results
-    from copsense.sweeps import failed_rows
+    from copsense.files import check_output
     from copsense.sweeps import sweep as evaluate
 
     if sum(what is not None for what in (com_y, joint, configurations)) != 1:
@@ -87,14 +86,12 @@ def sweep(
     within = read_limits(limits)
     path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
-        dataset = evaluate(path, chosen, within, progress=update)
-    if within is not None and within.any:
-        dataset = with_limit_margins(dataset, within)
-    dataset.attrs["command"] = "copsense " + shlex.join(sys.argv[1:])
-    failures = failed_rows(dataset)
+        swept = evaluate(path, chosen, within, progress=update)
+    dataset = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
+    failures = dataset.failed_rows
     if output is not None:
-        write_results(dataset, output, overwrite=force)
-    summary = _summary(dataset, output, failures)
+        dataset.save(output, overwrite=force)
+    summary = _summary(dataset, output)
     if as_json:
         echo_json(summary)
     else:
@@ -122,8 +119,8 @@ def _read_path(
     stance: Stance, com_y: str | None, joint: str | None, configurations: str | None
 ) -> PosturePath:
     """The path that the options ask for."""
+    from copsense.files import load_configurations
     from copsense.path import joint_sweep, lateral_sweep, path_through
-    from copsense.storage import load_configurations
 
     if configurations is not None:
         rows = load_configurations(configurations)
@@ -138,48 +135,29 @@ def _read_path(
         return joint_sweep(stance, name, start, stop, count, progress=update)
 
 
-def _summary(dataset: Any, output: str | None, failures: list[Any]) -> dict[str, Any]:
+def _summary(dataset: Sweep, output: str | None) -> dict[str, Any]:
     """What a person wants to know first: over which range every foot stays planted."""
-    coordinate = dataset.attrs["coordinate"]
-    values = dataset[coordinate].values
-    degrees = dataset[coordinate].attrs["units"] == "rad"
-    criteria = {}
-    for name in dataset["criterion"].values:
-        here = dataset.sel(criterion=name)
-        if "active_limits" in dataset:
-            planted = (here["active_limits"] == "").values & (here["reason"] == "").values
-        else:
-            planted = ((here["margin"] > 0) & ~here["pulling"]).all("contact").values
-        run = _longest_run(planted)
-        criteria[str(name)] = {
-            "planted": sorted(float(values[i]) for i in run) if run else None,
-            "smallest_margin": float(here["margin"].min()),
-            "largest_residual": float(here["residual"].max()),
+    coordinate, limits = dataset.coordinate, dataset.limits
+    ranges = dataset.planted_range if limits is None else dataset.free_range
+    criteria = {
+        name: {
+            "planted": ranges[name],
+            "smallest_margin": float(dataset["margin"].sel(criterion=name).min()),
+            "largest_residual": float(dataset["residual"].sel(criterion=name).max()),
         }
+        for name in dataset.labels("criterion")
+    }
     return {
         "robot": dataset.attrs["robot"],
-        "coordinate": coordinate,
-        "unit": "rad" if degrees else dataset[coordinate].attrs["units"],
-        "postures": len(values),
-        "failed_rows": len(failures),
+        "coordinate": coordinate.name,
+        "unit": coordinate.attrs["units"],
+        "postures": coordinate.size,
+        "failed_rows": len(dataset.failed_rows),
         "output": output,
         "criteria": criteria,
-        "limits": dataset.attrs.get("limits"),
+        "limits": None if limits is None else repr(limits),
         "without_sole": dataset.attrs["without_sole"],
     }
-
-
-def _longest_run(flags: Any) -> tuple[int, int] | None:
-    """First and last index of the longest run of true values."""
-    best, start = None, None
-    for i, flag in enumerate([*flags, False]):
-        if flag and start is None:
-            start = i
-        elif not flag and start is not None:
-            if best is None or i - 1 - start > best[1] - best[0]:
-                best = (start, i - 1)
-            start = None
-    return best
 
 
 def _rounded(value: float) -> float:

@@ -1,10 +1,10 @@
-"""Benchmark: how far a controller leans, or is pushed, before a foot tips, beside the prediction.
+"""Comparison of balancing controllers: how far a robot leans, or is pushed, before a foot tips.
 
 A plan is a set of cases: robot, posture, controller, conditions and trial, each a value. A case
 gives scores, a score is a row of one table, and a run that fails is a row with its reason. The
-prediction uses the law that the controller applies: it tells theory from physics, and ranks
-controllers by what physics says. Falls are scored with limits only, as a rate over perturbed
-repeats: without limits they follow chance more than the criterion.
+static prediction stands beside each score; it assumes the criterion that the controller applies, so
+it compares theory with physics. Falls are scored only within limits, as a rate over perturbed
+repeats: without limits they depend on chance more than on the criterion.
 """
 
 from copsense.comparison.benchmark_run import run_benchmark, run_case

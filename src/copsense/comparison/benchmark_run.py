@@ -20,7 +20,7 @@ from copsense.comparison.table import (
 )
 from copsense.comparison.workers import run_here, run_in_processes
 from copsense.errors import CopsenseError, InvalidInputError, OutputError
-from copsense.storage import check_output
+from copsense.files import check_output
 
 
 def run_case(case: Case, progress: Callable[[float], object] | None = None) -> list[Score]:

@@ -1,4 +1,4 @@
-"""Bisection: between which two values a robot that survives stops surviving."""
+"""Bisection: between which two values of a disturbance a robot first fails."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _FINEST = 1_000_000  # steps of a bisection
 
 @dataclass(frozen=True)
 class Bracket:
-    """Where something breaks.
+    """The interval in which something first fails.
 
     Attributes:
-        survived: the most severe value survived, NaN where none was.
-        failed: the mildest value that was not, NaN where every one was.
-        runs: how many values were tried.
+        survived: the most severe value that was survived; NaN if none was.
+        failed: the mildest value that was not; NaN if every one was.
+        runs: number of values tried.
     """
 
     survived: float
@@ -27,16 +27,16 @@ class Bracket:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lower and upper end; infinite where nothing broke, or everything did."""
+        """Lower and upper end of the known values."""
         known = [x for x in (self.survived, self.failed) if math.isfinite(x)]
         return min(known), max(known)
 
 
 def count_steps(mild: float, severe: float, step: float) -> int:
-    """How many steps lead from one end of a bisection to the other.
+    """Number of steps from one end of a bisection to the other.
 
     Raises:
-        InvalidInputError: so many that a step is lost in rounding.
+        InvalidInputError: there are so many that a step vanishes in rounding.
     """
     count = abs(severe - mild) / step
     if not count <= _FINEST:
@@ -48,13 +48,13 @@ def count_steps(mild: float, severe: float, step: float) -> int:
 
 
 def bisect(survives: Callable[[float], bool], mild: float, severe: float, step: float) -> Bracket:
-    """Bisect over mild, mild + step, ..., severe for where `survives` changes, taken as once.
+    """Bisect over mild, mild + step, ..., severe, assuming that `survives` changes only once.
 
     Args:
-        survives: asked of a value.
-        mild: the end that should survive; it is asked last, and only if nothing else did.
-        severe: the end that should not; it is asked first.
-        step: between the values; the last one is shortened to end at `severe`.
+        survives: whether a value is survived.
+        mild: the end that should survive; tried last, and only if no other value did.
+        severe: the end that should fail; tried first.
+        step: between the values; the last step is shortened to end at `severe`.
 
     Raises:
         InvalidInputError: the step is a millionth of the range or less.

@@ -24,15 +24,15 @@ IDEAL = Conditions()
 
 @dataclass(frozen=True)
 class Case:
-    """One robot in one posture under one controller in some conditions, put through one trial.
+    """One robot in one posture under one controller, in some conditions and one trial.
 
     Attributes:
-        robot: which, on which soles.
+        robot: the robot and its soles.
         posture: how it stands.
         controller: what balances it.
-        trial: what it is put through.
+        trial: what it has to do.
         conditions: what disturbs it.
-        trial_name: what to call the trial; default its kind.
+        trial_name: of the trial in results; default its kind.
     """
 
     robot: RobotChoice
@@ -43,12 +43,13 @@ class Case:
     trial_name: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse to count falls without limits."""
+        """Set the default name; reject falls without limits."""
         object.__setattr__(self, "trial_name", self.trial_name or self.trial.kind)
         if isinstance(self.trial, Falls) and not self.controller.limited:
             raise InvalidInputError(
-                f"falls of {self.controller.name!r} cannot be scored: without limits a robot that "
-                "has tipped falls or not by chance. Give limits (--limits), or leave falls out."
+                f"falls of {self.controller.name!r} cannot be scored: without limits it depends on "
+                "chance whether a robot that tipped falls. Give limits (--limits), or leave out "
+                "falls."
             )
 
     @property
@@ -77,7 +78,7 @@ class Case:
 
     @cached_property
     def key(self) -> str:
-        """A short name that is the same for the same parameters, in every process."""
+        """A short name, the same for the same parameters in every process."""
         text = json.dumps(self.parameters, sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
@@ -95,7 +96,7 @@ def make_plan(
         robots: which robots.
         postures: how they stand.
         controllers: what balances them.
-        trials: what they are put through; a mapping names them.
+        trials: what they have to do; a mapping gives names.
         conditions: what disturbs them.
     """
     named = trials if isinstance(trials, Mapping) else {trial.kind: trial for trial in trials}

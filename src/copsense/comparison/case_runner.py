@@ -6,8 +6,6 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal
 
-import xarray as xr
-
 from copsense.comparison.case import Case
 from copsense.comparison.prediction import Statics, statics
 from copsense.controllers import (
@@ -21,7 +19,7 @@ from copsense.controllers import (
     load_controller,
 )
 from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
-from copsense.simulation import MujocoSimulator, Push, Scenario, rollout
+from copsense.simulation import MujocoSimulator, Push, Recording, Scenario, rollout
 from copsense.stance import Stance
 
 _SHORTER = 0.85  # a lean out of reach is tried again, so much shorter
@@ -71,7 +69,7 @@ class CaseRunner:
         until: Literal["tip", "fall"] = "tip",
         push: Push | None = None,
         **changes: Any,
-    ) -> xr.Dataset:
+    ) -> Recording:
         """One rollout in the case's conditions, with a push or changed fields on top.
 
         Raises:

@@ -18,7 +18,7 @@ from copsense.robots import PRESETS, load_robot, load_stance
 from copsense.simulation import Scenario
 from copsense.stance import Stance
 
-# robot -> (hip pitch, knee, ankle pitch) of both legs, and their share of the knees' bend
+# robot -> (hip pitch, knee, ankle pitch) of both legs, each with its share of the knees' bend
 _LEGS: dict[str, tuple[tuple[str, float], ...]] = {
     "icub": tuple(
         (f"{side}_{joint}", share)
@@ -50,12 +50,12 @@ class RobotChoice:
 
     Attributes:
         source: a preset's name, or the path of a URDF or MJCF.
-        name: what to call it; default the source.
-        contacts: frames of its contacts; default the preset's.
-        soles: frame -> rectangle (x0, x1, y0, y1) in the contact frame [m], instead of the
-            collision geometry's.
-        sole_height: of the contact plane over the model's frames, along its normal [m]; for the
-            contacts of `soles`.
+        name: in results; default the source.
+        contacts: frames of the contacts; default the preset's.
+        soles: frame -> rectangle (x0, x1, y0, y1) in the contact frame [m], instead of the sole
+            from the collision geometry.
+        sole_height: height of the contact plane above the model's frames, along its normal [m];
+            for the contacts of `soles`.
     """
 
     source: str
@@ -65,7 +65,7 @@ class RobotChoice:
     sole_height: float = 0.0
 
     def __post_init__(self) -> None:
-        """Name it, and refuse soles that are none."""
+        """Set the default name and validate the soles."""
         object.__setattr__(self, "name", self.name or Path(self.source).stem)
         object.__setattr__(self, "contacts", tuple(self.contacts))
         finite_number(self.sole_height, f"the sole height of robot {self.name!r} [m]")
@@ -80,7 +80,7 @@ class RobotChoice:
         """The robot standing in a posture.
 
         Raises:
-            CopsenseError: it cannot be loaded, or cannot stand so.
+            CopsenseError: the robot cannot be loaded, or cannot stand in this posture.
         """
         robot: str | Robot = self.source if self.source in PRESETS else load_robot(self.source)
         contacts: list[str | Contact] | None = list(self.contacts) or None
@@ -102,11 +102,11 @@ class PostureChoice:
     """How a robot stands.
 
     Attributes:
-        name: what to call it.
-        knees: bend of both knees [rad], the hips and ankles level the soles; None leaves the legs
-            as the preset has them.
-        width: between the feet [m], or None.
-        joints: joint -> position that the posture stays nearest to [rad].
+        name: in results.
+        knees: bend of both knees [rad]; hips and ankles keep the soles level. None leaves the legs
+            as in the preset.
+        width: between the feet [m]; None as in the preset.
+        joints: joint -> position that the posture stays close to [rad, m].
     """
 
     name: str = "own"
@@ -115,17 +115,17 @@ class PostureChoice:
     joints: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no posture."""
+        """Validate knees and width."""
         if self.knees is not None:
             finite_number(self.knees, f"the knees' bend of posture {self.name!r} [rad]")
         if self.width is not None:
             finite_number(self.width, f"the width of posture {self.name!r} [m]", positive=True)
 
     def angles(self, robot: str) -> dict[str, float]:
-        """Joint -> position [rad] for a robot.
+        """Joint -> position [rad, m] for a robot.
 
         Raises:
-            UnknownNameError: knees are asked of a robot whose legs are not known here.
+            UnknownNameError: knees are given for a robot whose legs are not in the table here.
         """
         angles: dict[str, float] = {}
         if self.knees is not None:
@@ -146,9 +146,9 @@ class ControllerChoice:
         characteristic_length: L of minimum-wrench [m].
         gains: ``"stiff"`` or ``"public"``.
         limits: what the contact wrenches and torques must respect, or None.
-        name: what to call it; default the criterion, "within limits" where there are some.
+        name: in results; default the criterion, and "within limits" if there are any.
         source: ``MODULE:ATTRIBUTE`` of a callable stance -> controller, instead of the balancing
-            controller; `criterion` and `limits` are then what the prediction assumes.
+            controller; the prediction then assumes `criterion` and `limits`.
     """
 
     criterion: str = "minimum-torque"
@@ -159,7 +159,7 @@ class ControllerChoice:
     source: str = ""
 
     def __post_init__(self) -> None:
-        """Name it, and refuse names that mean nothing."""
+        """Set the default name and validate the others."""
         criterion_named(self.criterion, self.characteristic_length)
         if self.gains not in _GAINS:
             raise UnknownNameError("set of gains", self.gains, _GAINS)
@@ -178,7 +178,7 @@ class ControllerChoice:
 
     @property
     def law(self) -> Criterion:
-        """The criterion itself."""
+        """The criterion with that name."""
         return criterion_named(self.criterion, self.characteristic_length)
 
     def gains_of(self, robot: Robot) -> Gains:
@@ -188,10 +188,10 @@ class ControllerChoice:
 
 @dataclass(frozen=True)
 class Conditions:
-    """What disturbs every run of a case.
+    """Disturbances of every run of a case.
 
     Attributes:
-        name: what to call them.
+        name: in results.
         values: fields of `copsense.simulation.Scenario` and their values, such as
             ``{"motors": Motors(delay=0.005)}``.
     """
@@ -200,7 +200,7 @@ class Conditions:
     values: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no field of a scenario, or the trial's own affair."""
+        """Reject names that are not fields of a scenario, or are set by the trial."""
         known = [f.name for f in fields(Scenario) if f.name not in ("duration", "reference")]
         for name in self.values or {}:
             if name not in known:

@@ -1,4 +1,4 @@
-"""Ranking: which controller is better, as far as the scores can tell; and theory beside physics."""
+"""Ranking of controllers by their scores, and agreement of the predictions with physics."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import pandas as pd
 from copsense.comparison.score_kinds import SCORES
 
 CAVEAT = (
-    "Prediction and controller share the law that shares the load: the agreement holds the theory "
-    "against physics, and says nothing of a controller that follows another law."
+    "Prediction and controller use the same criterion to share the load: the agreement compares "
+    "theory with physics, and does not apply to controllers that share the load in another way."
 )
-"""To be said wherever the agreement is."""
+"""A note to show with every agreement."""
 
 _SETTING = ["robot", "posture", "conditions", "trial", "score"]
 _SAME = 1e-9  # relative spread below which values are taken as one
-# Scores that tell theory from physics; the others have no prediction, or one of zero.
+# Scores with a prediction to compare; the others have none, or one of zero.
 _COMPARED = (
     "tip_excursion",
     "tip_impulse",
@@ -31,16 +31,17 @@ _COMPARED = (
 def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
     """The controllers' ranks in each setting (robot, posture, conditions, trial) and score.
 
-    A controller's rank is 1 plus the number of those clearly better: whose interval lies wholly
-    beyond its own. Within their resolution controllers share a rank. A run that failed
-    or tipped too early comes last; where every one did, or nothing can be measured, none is ranked.
+    A controller's rank is 1 plus the number of controllers that are clearly better, whose interval
+    lies wholly beyond its own; within their resolution controllers share a rank. A run that failed
+    or tipped too early ranks last. A setting in which every run did, or nothing can be measured, is
+    left out.
 
     Returns:
-        The rows of the table that are ranked with ``rank`` and ``of``, the number of controllers in
-        the setting.
+        The ranked rows of the table with ``rank`` and ``of``, the number of controllers in the
+        setting.
     """
-    told = ~table["status"].isin(["failed", "tipped", "none"])
-    some = told.groupby([table[name] for name in _SETTING]).transform("any")
+    known = ~table["status"].isin(["failed", "tipped", "none"])
+    some = known.groupby([table[name] for name in _SETTING]).transform("any")
     ranked = table[some & (table["status"] != "none")].copy()
     ranked["rank"], ranked["of"] = 1, 1
     for (*_, score), rows in ranked.groupby(_SETTING, sort=False):
@@ -59,12 +60,12 @@ def rank_scores(table: pd.DataFrame) -> pd.DataFrame:
 def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
     """How the controllers compare in each trial's scores, over all settings.
 
-    Only settings in which every controller of the trial was tried count, where there is one.
+    Only settings in which every controller of the trial was tried count, if there is one.
 
     Returns:
         A row for each trial, score and controller, the best first, with ``mean_rank``, ``wins``
-        (settings in which none is better), ``settings``, ``failures`` (of these, failed or tipped),
-        and ``mean`` of the values (NaN where one was not measured).
+        (settings in which no controller is better), ``settings``, ``failures`` (of these, failed or
+        tipped), and ``mean`` of the values (NaN if one was not measured).
     """
     ranked, rows = rank_scores(table), []
     for (trial, score), group in ranked.groupby(["trial", "score"], sort=False):
@@ -94,22 +95,22 @@ def rank_controllers(table: pd.DataFrame) -> pd.DataFrame:
     return found.drop(columns="_order").reset_index(drop=True)
 
 
-def _own(parameters: str) -> bool:
-    """Whether a case's controller is somebody's own."""
+def _is_users(parameters: str) -> bool:
+    """Whether a case's controller is a user's own."""
     return bool(parameters and json.loads(parameters)["controller"].get("source"))
 
 
 def agreement(table: pd.DataFrame) -> pd.DataFrame:
     """How well the predictions hold, over the rows that were measured. See `CAVEAT`.
 
-    Controllers of one's own are left out: the prediction only assumes their law.
+    Users' own controllers are left out: the prediction only assumes their criterion.
 
     Returns:
         A row per score and prediction (``"path"``, exact, or ``"first order"``): ``cases``, mean
         and largest absolute error in the score's unit, Pearson's ``correlation`` with the ends
         ``low`` and ``high`` of its 95 % interval (Fisher's z; NaN under four cases).
     """
-    rows, table = [], table[~table["parameters"].map(_own)]
+    rows, table = [], table[~table["parameters"].map(_is_users)]
     for score in _COMPARED:
         of_score = table[(table["score"] == score) & (table["status"] == "measured")]
         for prediction, column in (("path", "predicted"), ("first order", "first_order")):

@@ -17,18 +17,19 @@ class Score:
 
     Attributes:
         score: its name, one of `SCORES`.
-        status: ``"measured"``; ``"bound"`` where only the interval is known, as when nothing
-            tipped; ``"tipped"`` where a contact tipped before it could be measured; ``"none"``
-            where the robot has nothing of the kind, as point feet no edges; ``"failed"``.
+        status: ``"measured"``; ``"bound"`` if only one end of the interval is known, such as when
+            nothing tipped; ``"tipped"`` if a contact tipped before it could be measured;
+            ``"none"`` if the robot has nothing to measure, such as edges of point feet;
+            ``"failed"``.
         value: in the score's unit, NaN unless measured.
-        low: lower end of what the value may be: resolution, bracket, or 95 % interval of a rate.
+        low: lower end of the value's interval: resolution, bracket, or 95 % interval of a rate.
         high: upper end.
-        predicted: by the statics along the exact path; NaN where they say nothing.
+        predicted: by the statics along the exact path; NaN without a prediction.
         first_order: by statics and sensitivity at the start alone.
         contact: the contact that tipped, lifted or slipped first, or empty.
         how: ``"tips"``, ``"lifts"`` or ``"slips"``, or empty.
         predicted_contact: the contact that should do so, by the statics.
-        runs: how many rollouts it took.
+        runs: number of simulations.
         reason: how the run ended, or why it failed.
     """
 
@@ -52,5 +53,5 @@ class Score:
 
 
 def failed(scores: tuple[str, ...], reason: str) -> list[Score]:
-    """Rows of a case that could not be run."""
+    """The rows of a case that could not be run."""
     return [Score(name, "failed", reason=reason) for name in scores]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ScoreKind:
-    """What a score's number is.
+    """What the number of a score is.
 
     Attributes:
         unit: of value, interval and predictions.
-        larger: whether a larger value is the better one.
-        meaning: in words.
-        resolution: differences below are the engine's, not the controller's: a sole sinks by
-            0.02 mm into the ground of a simulation.
+        larger: whether larger values are better.
+        meaning: a description.
+        resolution: smaller differences come from the engine, not the controller: in the
+            simulation a sole sinks by 0.02 mm.
     """
 
     unit: str
@@ -42,7 +42,7 @@ SCORES = {
         "N m", False, "torque limit of the legs at which a sway first tips a contact"
     ),
 }
-"""What each score is."""
+"""The scores, by name."""
 
 
 def shown_unit(unit: str) -> tuple[str, float]:

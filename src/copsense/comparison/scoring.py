@@ -9,7 +9,6 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from copsense.comparison.bisection import Bracket, bisect
 from copsense.comparison.case_runner import CaseRunner
@@ -18,7 +17,7 @@ from copsense.comparison.score import Score, failed
 from copsense.comparison.score_kinds import SCORES
 from copsense.comparison.trials import Breaking, Falls, Lean, PushToTip, Rest, Sway
 from copsense.controllers import Hold, Sine
-from copsense.simulation import Motors, Noise, Push
+from copsense.simulation import Motors, Noise, Push, Recording
 from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push
@@ -117,7 +116,7 @@ def _push(trial: PushToTip, runner: CaseRunner) -> list[Score]:
     expected, note = runner.statics(lean)
     reference = runner.reference(Hold())
     largest = trial.largest or _FASTEST * runner.stance.robot.mass
-    tips: dict[float, xr.Dataset] = {}
+    tips: dict[float, Recording] = {}
 
     def survives(impulse: float) -> bool:
         force = (0.0, sign * impulse / trial.duration, 0.0)
@@ -199,7 +198,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
     reference = runner.reference(Sine(trial.amplitude, trial.frequency))
     values = dict(runner.case.conditions.values or {})
     motors, noise = values.get("motors", Motors()), values.get("noise", Noise())
-    runs: dict[float, xr.Dataset] = {}
+    runs: dict[float, Recording] = {}
 
     def survives(value: float) -> bool:
         changes: dict[str, Any]
@@ -233,7 +232,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
     return [replace(row, predicted=on_path, first_order=first_order)]
 
 
-def _with_contact(row: Score, run: xr.Dataset) -> Score:
+def _with_contact(row: Score, run: Recording) -> Score:
     """A row with the contact that tipped, lifted or slipped first in a run, and how."""
     kind = str(run.attrs["tip_kind"])
     return replace(row, contact=str(run.attrs["tip_contact"]), how=f"{kind}s" if kind else "")

@@ -17,7 +17,7 @@ from copsense.comparison.case import Case
 from copsense.comparison.score import Score
 from copsense.comparison.score_kinds import SCORES
 from copsense.errors import InvalidInputError
-from copsense.storage import write_beside
+from copsense.files import write_beside
 
 NAMES = ("robot", "posture", "controller", "conditions", "trial")
 COLUMNS = (

@@ -1,4 +1,4 @@
-"""Trials: what a robot is put through, each a value."""
+"""Trials: what a robot has to do in a case, each a value."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Lean:
     """A slow lateral lean until a contact tips.
 
     Attributes:
-        reach: how far to lean [m]; None until the CoM is over the foot, or as far as it gets.
+        reach: how far to lean [m]; None until the CoM is over the foot, or as far as possible.
         speed: of the CoM [m/s].
         side: ``"left"`` or ``"right"``.
     """
@@ -34,7 +34,7 @@ class Lean:
     scores: ClassVar[tuple[str, ...]] = ("tip_excursion",)
 
     def __post_init__(self) -> None:
-        """Refuse what is no lean."""
+        """Validate reach, speed and side."""
         if self.reach is not None:
             finite_number(self.reach, "the reach of a lean [m]", positive=True)
         finite_number(self.speed, "the speed of a lean [m/s]", positive=True)
@@ -48,11 +48,11 @@ class Lean:
 
 @dataclass(frozen=True)
 class PushToTip:
-    """Lateral pushes on the base, bisected for the least that tips a contact.
+    """Lateral pushes on the base, bisected for the smallest that tips a contact.
 
     Attributes:
-        resolution: bisect until the two ends are within twice this [N s].
-        largest: impulse to try first [N s]; None for what gives the CoM 0.5 m/s.
+        resolution: the bisection ends when its ends are within twice this [N s].
+        largest: impulse to try first [N s]; None for one that gives the CoM 0.5 m/s.
         duration: of each push [s].
         side: ``"left"`` or ``"right"``.
     """
@@ -66,7 +66,7 @@ class PushToTip:
     scores: ClassVar[tuple[str, ...]] = ("tip_impulse",)
 
     def __post_init__(self) -> None:
-        """Refuse what is no push."""
+        """Validate resolution, impulse, duration and side."""
         finite_number(self.resolution, "the resolution of a push [N s]", positive=True)
         if self.largest is not None:
             finite_number(self.largest, "the largest push [N s]", positive=True)
@@ -84,12 +84,12 @@ class PushToTip:
 class Sway:
     """A sinusoidal lateral sway, the same motion for every controller.
 
-    The first 0.1 s (a fifth, where it is shorter) is not scored: the ground takes up the weight.
+    The first 0.1 s (or a fifth of the time, if shorter) is not scored: the contacts settle.
 
     Attributes:
         amplitude: of CoM y [m]; a negative one starts to the right.
         frequency: [Hz].
-        periods: how many.
+        periods: number of periods.
     """
 
     amplitude: float = 0.02
@@ -105,7 +105,7 @@ class Sway:
     )
 
     def __post_init__(self) -> None:
-        """Refuse what is no sway."""
+        """Validate amplitude, frequency and periods."""
         finite_number(self.amplitude, "the amplitude of a sway [m]")
         finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
         finite_number(self.periods, "the periods of a sway", positive=True)
@@ -118,7 +118,7 @@ class Sway:
 
 @dataclass(frozen=True)
 class Rest:
-    """Standing still: what physics measures beside what the statics say.
+    """Standing still: measured wrenches and CoPs beside those of the statics.
 
     Attributes:
         duration: how long [s]; the last fifth is measured.
@@ -130,7 +130,7 @@ class Rest:
     scores: ClassVar[tuple[str, ...]] = ("wrench_error", "cop_error")
 
     def __post_init__(self) -> None:
-        """Refuse what is no time."""
+        """Validate the duration."""
         finite_number(self.duration, "the duration of a rest [s]", positive=True)
 
     @property
@@ -141,19 +141,19 @@ class Rest:
 
 @dataclass(frozen=True)
 class Falls:
-    """Perturbed lateral pushes; how many end in a fall. Needs limits.
+    """Perturbed lateral pushes, counting those that end in a fall. Needs limits.
 
-    Each repeat draws when the push comes (up to half a second later), to which side, and the noise
-    of the joint sensors.
+    The time of the push (within half a second), its side, and the noise of the joint sensors are
+    drawn for each repeat.
 
     Attributes:
-        velocity: what each push gives the CoM, impulse per mass [m/s].
-        repeats: how many pushes.
+        velocity: that each push gives the CoM, impulse per mass [m/s].
+        repeats: number of pushes.
         duration: of each push [s].
         position_noise: standard deviation of the joint positions [rad].
         velocity_noise: of the joint velocities [rad/s].
-        watch: time after a push in which a fall counts [s].
-        seed: of everything random.
+        watch: time after a push during which a fall counts [s].
+        seed: of the random draws.
     """
 
     velocity: float = 0.14
@@ -168,7 +168,7 @@ class Falls:
     scores: ClassVar[tuple[str, ...]] = ("fall_rate",)
 
     def __post_init__(self) -> None:
-        """Refuse what counts nothing."""
+        """Validate the numbers."""
         for name in ("velocity", "duration", "watch"):
             finite_number(getattr(self, name), f"the {name} of the falls", positive=True)
         for name in ("repeats", "seed"):
@@ -185,7 +185,7 @@ class Falls:
         return self.repeats * (self.watch + 0.5)
 
 
-# parameter -> (mild, severe, step); a step is twice the resolution
+# parameter -> (mild, severe, step); the resolution is half a step
 _RANGES = {
     "delay": (0.0, 0.05, 1e-3),
     "bandwidth": (50.0, 0.5, 0.5),
@@ -196,14 +196,14 @@ _RANGES = {
 
 @dataclass(frozen=True)
 class Breaking:
-    """A sway under ever worse motors or sensors, bisected for where a contact first tips.
+    """A sway under worse and worse motors or sensors, bisected for where a contact first tips.
 
     Attributes:
         parameter: ``"delay"`` [s] or ``"bandwidth"`` [Hz] of the torques, ``"velocity_noise"``
             of the joints [rad/s], or ``"torque_limit"`` of the legs [Nm].
-        mild: a value that should be survived; None for a usual one.
-        severe: a value that should not.
-        step: of the values tried; the resolution is half of it.
+        mild: a value that should be survived; None for the default.
+        severe: a value that should not; None for the default.
+        step: between the values tried; the resolution is half of it. None for the default.
         amplitude: of the sway [m].
         frequency: of the sway [Hz]; it lasts one period.
     """
@@ -216,7 +216,7 @@ class Breaking:
     frequency: float = 0.2
 
     def __post_init__(self) -> None:
-        """Fill in the usual range, and refuse what is none."""
+        """Set the default range and validate it."""
         if self.parameter not in _RANGES:
             raise UnknownNameError("parameter to break", self.parameter, _RANGES)
         for name, usual in zip(("mild", "severe", "step"), _RANGES[self.parameter], strict=True):
@@ -230,15 +230,15 @@ class Breaking:
         if not 0 <= ends[0] < ends[1] or (ends[0] == 0 and not rises):  # type: ignore[operator]
             order = "0 or more, severe over mild" if rises else "over 0, severe under mild"
             raise InvalidInputError(
-                f"the {self.parameter} from mild = {self.mild:g} to severe = {self.severe:g} gets "
-                f"no worse. Give both {order}."
+                f"the {self.parameter} does not get worse from mild = {self.mild:g} to severe = "
+                f"{self.severe:g}. Give both {order}."
             )
         finite_number(self.amplitude, "the amplitude of a sway [m]")
         finite_number(self.frequency, "the frequency of a sway [Hz]", positive=True)
 
     @property
     def kind(self) -> str:
-        """As a plan calls it."""
+        """Its name in a plan."""
         return self.parameter
 
     @property
@@ -253,7 +253,7 @@ class Breaking:
 
 
 Trial = Lean | PushToTip | Sway | Rest | Falls | Breaking
-"""What a case does; another trial is another value here, and a function in `score`."""
+"""A trial of a case; a new kind needs a type here and a function in `scoring`."""
 
 KINDS: dict[str, type[Lean | PushToTip | Sway | Rest | Falls | Breaking]] = {
     "lean": Lean,
@@ -266,16 +266,16 @@ KINDS: dict[str, type[Lean | PushToTip | Sway | Rest | Falls | Breaking]] = {
 
 
 def trial_named(kind: str, /, **options: object) -> Trial:
-    """A trial by the name that plans and the command give it.
+    """A trial by its name in plans and on the command line.
 
     Raises:
         UnknownNameError: no such trial, or no such option of it.
-        InvalidInputError: an option's value means nothing.
+        InvalidInputError: an option's value is not valid.
     """
     if kind not in KINDS:
         raise UnknownNameError("disturbance", kind, KINDS)
     cls = KINDS[kind]
-    known = [field.name for field in fields(cls) if field.name != "parameter"]  # the kind says it
+    known = [field.name for field in fields(cls) if field.name != "parameter"]  # given by the kind
     for name in options:
         if name not in known:
             raise UnknownNameError(f"option of the trial {kind!r}", name, known)

@@ -1,4 +1,4 @@
-"""Workers: cases over processes; one that dies takes only its own case with it."""
+"""Workers: processes that run cases; one that dies fails its own case only."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from copsense.comparison.case import Case
 from copsense.comparison.score import Score, failed
 
-# The matrices are small: more threads than one cost more than they bring, and change sums' order.
+# The matrices are small: more BLAS threads cost time, and change the order of sums.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 Run = Callable[[Case, Callable[[float], object] | None], list[Score]]
@@ -35,24 +35,24 @@ def run_in_processes(
 ) -> Iterator[tuple[Case, list[Score]]]:
     """Run cases in `jobs` processes, and yield each as it is done.
 
-    Whatever ends the iteration (an interrupt, too) ends the processes. One that dies, as in a
-    crash of a library, gives its case a failed row and is replaced.
+    The processes end when the iteration ends, also by an interrupt. A process that dies, such as in
+    a crash of a library, gives its case a failed row and is replaced.
     """
     waiting = list(reversed(cases))
-    crew: dict[Connection, _Worker] = {}
+    workers: dict[Connection, _Worker] = {}
     try:
-        while waiting or crew:
-            while waiting and len(crew) < jobs:
+        while waiting or workers:
+            while waiting and len(workers) < jobs:
                 worker = _Worker(run)
-                crew[worker.link] = worker
+                workers[worker.link] = worker
                 worker.give(waiting.pop())
-            for link in wait(list(crew)):
-                worker = crew[link]  # type: ignore[index]
+            for link in wait(list(workers)):
+                worker = workers[link]  # type: ignore[index]
                 try:
                     answer = worker.link.recv()
                 except (EOFError, OSError):
-                    del crew[worker.link]
-                    yield worker.case, failed(worker.case.trial.scores, worker.epitaph())
+                    del workers[worker.link]
+                    yield worker.case, failed(worker.case.trial.scores, worker.cause_of_death())
                     continue
                 if isinstance(answer, float):
                     progress(worker.case, answer)
@@ -61,21 +61,21 @@ def run_in_processes(
                 if waiting:
                     worker.give(waiting.pop())
                 else:
-                    del crew[worker.link]
+                    del workers[worker.link]
                     worker.dismiss()
     finally:
-        for worker in crew.values():
+        for worker in workers.values():
             worker.process.terminate()
             worker.process.join()
 
 
 class _Worker:
-    """A process, the link to it, and what it is at."""
+    """A process, the connection to it, and the case that it runs."""
 
     case: Case
 
     def __init__(self, run: Run) -> None:
-        # Spawned, not forked: a copy of a process with threads may hang.
+        # Spawned, not forked: a fork of a process with threads may hang.
         context = multiprocessing.get_context("spawn")
         self.link, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs, run), daemon=True)
@@ -84,19 +84,19 @@ class _Worker:
         theirs.close()
 
     def give(self, case: Case) -> None:
-        """Have it run a case."""
+        """Send it a case."""
         self.case = case
         try:
             self.link.send(case)
-        except OSError:  # it has died: reading from it will tell
+        except OSError:  # it has died, which reading from it will show
             return
 
     def dismiss(self) -> None:
-        """Let it go."""
+        """End it after its last case."""
         self.link.close()
         self.process.join()
 
-    def epitaph(self) -> str:
+    def cause_of_death(self) -> str:
         """Why it died."""
         self.link.close()
         self.process.join()
@@ -107,8 +107,8 @@ class _Worker:
 
 
 def _work(link: Any, run: Run) -> None:
-    """Answer cases with scores until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent says when to stop
+    """Answer cases with their scores until the connection is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
     with threadpool_limits(limits=1, user_api="blas"):
         try:
             while True:
@@ -119,7 +119,7 @@ def _work(link: Any, run: Run) -> None:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes started inside load their BLAS with one thread."""
+    """Processes that are started inside use one BLAS thread."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     try:

@@ -32,14 +32,10 @@ from copsense.controllers.controller import Command, Observation
 from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
 from copsense.controllers.limited import ShareWithinLimits
-from copsense.controllers.sharing import (
-    LoadProblem,
-    ShareByCriterion,
-    ShareLoad,
-    well_determined,
-)
+from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
 from copsense.criterion import Criterion
 from copsense.limits import Limits
+from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
 
 _RANK = 1e-10  # relative pivot under which the contacts are taken as redundant
@@ -69,6 +65,7 @@ class BalancingController:
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
         self.stance, self.criterion, self.gains = stance, criterion, gains
+        self.limits = limits
         self.name = name or criterion.name
         if share is None and limits is not None and limits.any:
             share = ShareWithinLimits(stance, criterion, limits)

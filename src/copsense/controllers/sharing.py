@@ -9,39 +9,18 @@ Matrices this small are multiplied with `dot`: it takes half the time of `@`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import lapack
 
-from copsense.criterion import Criterion, Quadratic
+from copsense.criterion import Criterion
 from copsense.errors import UndeterminedWrenchError
+from copsense.load_problem import LoadProblem
+from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 
 _NULL = 1e-9  # curvature, relative to the cost's size, under which a direction is free
-
-
-@dataclass(frozen=True, eq=False)
-class LoadProblem:
-    """Which contact forces f are allowed, and which torques they take.
-
-    J_b' f = base_wrench, and tau = torque_offset - J_s' f (see `balancing` for the letters). The
-    arrays are good until the controller's next step: copy what is to be kept.
-
-    Attributes:
-        base_map: J_b' (6, m), stacked contact forces to the wrench on the base.
-        base_wrench: the wanted wrench of all contacts on the base (6,), base axes.
-        joint_map: J_s' (n, m).
-        torque_offset: (n,) [Nm].
-        joint_inertia: M_j (n, n), for a criterion that weighs with its inverse.
-    """
-
-    base_map: Float[np.ndarray, "6 m"]
-    base_wrench: Float[np.ndarray, " 6"]
-    joint_map: Float[np.ndarray, "n m"]
-    torque_offset: Float[np.ndarray, " n"]
-    joint_inertia: Float[np.ndarray, "n n"]
 
 
 ShareLoad = Callable[[LoadProblem], Float[np.ndarray, " m"]]
@@ -58,10 +37,10 @@ class ShareByCriterion:
     def __init__(self, stance: Stance, criterion: Criterion) -> None:
         """Read the weights; whether they determine the forces shows at the first problem."""
         self.criterion = criterion
-        self._levels = []
+        self._levels: list[Quadratic] = []
         level: Criterion | None = criterion
         while level is not None:
-            self._levels.append(_Level(level.at(stance)))
+            self._levels.append(level.at(stance))
             level = level.tie_break
 
     def __call__(self, problem: LoadProblem) -> Float[np.ndarray, " m"]:
@@ -74,7 +53,9 @@ class ShareByCriterion:
         if not Z.shape[1]:  # one foot has no choice
             return np.asarray(forces)
         for level in self._levels:
-            H, g = level.along(problem, forces, Z)
+            # The cost along Z from these forces: curvature, and minus the slope.
+            cost, pull = level.over_forces(problem)
+            H, g = Z.T.dot(cost.dot(Z)), Z.T.dot(pull - cost.dot(forces))
             cholesky, info = lapack.dpotrf(H)
             if info == 0 and well_determined(H, cholesky, _NULL):
                 return np.asarray(forces + Z.dot(lapack.dpotrs(cholesky, g)[0]))
@@ -101,44 +82,6 @@ def well_determined(matrix: np.ndarray, factor: np.ndarray, least: float) -> boo
     """
     pivots, entries = factor.diagonal().tolist(), matrix.diagonal().tolist()
     return bool(min(pivots) ** 2 > least * max(entries))
-
-
-class _Level:
-    """A quadratic cost, of which only the terms that it has are computed."""
-
-    def __init__(self, quadratic: Quadratic) -> None:
-        self._cost = quadratic
-        self._has_torque = bool(quadratic.torque.any() or quadratic.inertia)
-        self._has_wrench = bool(quadratic.wrench.any() or quadratic.pull.any())
-        one = np.array_equal(quadratic.torque, np.eye(len(quadratic.torque)))
-        self._plain = one and not quadratic.inertia
-
-    def along(
-        self, problem: LoadProblem, forces: np.ndarray, Z: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Curvature of the cost along Z, and minus its slope there at some forces."""
-        if not self._has_wrench:
-            return self._torque(problem, forces, Z)
-        if not self._has_torque:
-            return self._wrench(forces, Z)
-        (H, g), (more, pull) = self._torque(problem, forces, Z), self._wrench(forces, Z)
-        return H + more, g + pull
-
-    def _torque(
-        self, problem: LoadProblem, forces: np.ndarray, Z: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        cost, A = self._cost, problem.joint_map
-        AZ = WAZ = A.dot(Z)
-        if not self._plain:
-            W = cost.torque
-            if cost.inertia:
-                W = W + cost.inertia * np.linalg.inv(problem.joint_inertia)
-            WAZ = W.dot(AZ)
-        return AZ.T.dot(WAZ), WAZ.T.dot(problem.torque_offset - A.dot(forces))
-
-    def _wrench(self, forces: np.ndarray, Z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        W, pull = self._cost.wrench, self._cost.pull
-        return Z.T.dot(W.dot(Z)), Z.T.dot(pull - W.dot(forces))
 
 
 def _allowed(

@@ -10,7 +10,7 @@ import numpy as np
 from copsense.batch import PostureChart
 from copsense.maps.map_plan import MapPlan
 from copsense.margins import MarginTable, margin_table
-from copsense.sweeps import variable_name
+from copsense.sweep_layout import variable_name
 
 EVALUATED, UNREACHABLE, REJECTED, INFEASIBLE, UNSOLVED = range(5)
 # How a posture was evaluated under a criterion, by its code in the column `status`.

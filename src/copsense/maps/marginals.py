@@ -90,7 +90,7 @@ def marginal(
             f"a picture is drawn over two coordinates, got {', '.join(names)}. The map has "
             f"{', '.join(known)}."
         )
-    sampled = map_parameters(dataset.attrs)["sampling"]["kind"] == "sample"
+    sampled = map_parameters(dataset.attrs)["sampling"]["is"] == "Sample"
     dataset = dataset.isel(posture=_visited(dataset))
     cells = [_cells(np.asarray(dataset[name].values), sampled) for name in names]
     shape = tuple(len(edges) - 1 for edges, _ in cells)
@@ -122,7 +122,7 @@ def _visited(dataset: xr.Dataset) -> slice | np.ndarray:
         return slice(None)
     if not done.any():
         raise InvalidInputError("no posture of the map is evaluated yet. Resume the map first.")
-    size = map_parameters(dataset.attrs)["chunk"]
+    size = int(map_parameters(dataset.attrs)["chunk"])
     return np.flatnonzero(np.repeat(done, size)[: dataset.sizes["posture"]])
 
 

@@ -25,6 +25,7 @@ from jaxtyping import Float
 
 from copsense._version import __version__
 from copsense.errors import CopsenseError, MissingExtraError, OutputError
+from copsense.files import check_output
 from copsense.maps.columns import (
     EVALUATED,
     PENDING,
@@ -36,9 +37,9 @@ from copsense.maps.columns import (
     fill_value,
     labels,
 )
-from copsense.maps.map_plan import MapPlan, differences, digest, worded
+from copsense.maps.map_plan import MapPlan
 from copsense.maps.reduction import QUANTITIES, WORST, Part
-from copsense.storage import check_output
+from copsense.provenance import differences, digest, worded
 
 _PARAMETERS = "copsense_map"  # the attribute by which a store is known
 _SUFFIX = ".zarr"

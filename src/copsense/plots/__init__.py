@@ -6,23 +6,23 @@ need several. No window is opened and no figure is kept in a global state.
 
 from __future__ import annotations
 
-from copsense.plots.benchmark import plot_benchmark
-from copsense.plots.cops import plot_cop, plot_foot_cop
-from copsense.plots.curves import (
+from copsense.plots.benchmark_plots import plot_benchmark
+from copsense.plots.cop_plots import plot_cop, plot_foot_cop
+from copsense.plots.curve_plots import (
     plot_load,
     plot_margin,
     plot_sensitivity,
     plot_torques,
     plot_travel,
 )
-from copsense.plots.design import plot_design
-from copsense.plots.limits import plot_limit_margins, plot_limited, plot_regions
-from copsense.plots.maps import plot_map
-from copsense.plots.rollout import plot_rollout
+from copsense.plots.design_plots import plot_design
+from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_regions
+from copsense.plots.map_plots import plot_map
+from copsense.plots.recording_plots import plot_rollout
 from copsense.plots.saving import render_figure, save_figure
-from copsense.plots.soles import plot_soles
-from copsense.plots.stance import plot_stance
-from copsense.plots.summary import plot_results
+from copsense.plots.sole_plots import plot_soles
+from copsense.plots.stance_plots import plot_stance
+from copsense.plots.sweep_plots import plot_results
 
 __all__ = [
     "plot_benchmark",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
-from copsense.plots.reading import abscissa, failed
+from copsense.plots.reading import abscissa
 from copsense.plots.style import BAD, MUTED
+from copsense.sweeps import Sweep
 
 _FEW = 12  # postures: as few as this are shown as points on the line
 _NOTHING = 1e-9  # of the largest value: less below zero is rounding
@@ -18,10 +18,10 @@ _ROOM = 0.1  # of the axes, that a line of text needs
 
 
 def mark_failed(
-    ax: Axes, dataset: xr.Dataset, colour: dict[str, str], against: str | None = None
+    ax: Axes, dataset: Sweep, colour: dict[str, str], against: str | None = None
 ) -> None:
     """A cross on the lower edge where a row has failed: a gap alone is easily missed."""
-    x, rows = abscissa(dataset, against).values, failed(dataset)
+    x, rows = abscissa(dataset, against).values, dataset.failed.values
     if not rows.any():
         return
     for j, shade in enumerate(colour.values()):
@@ -48,7 +48,7 @@ def mark_failed(
     )
 
 
-def marks(dataset: xr.Dataset) -> dict[str, Any]:
+def marks(dataset: Sweep) -> dict[str, Any]:
     """Style of a line: points on it where there are few postures."""
     return {"marker": "o", "markersize": 3.5} if dataset.sizes["posture"] <= _FEW else {}
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
+from copsense.labelled import LabelledResult
 from copsense.polygon import Polygon, unpadded
 
-ON_EDGE = 1e-9  # m: a CoP this near to its edge is on it
 MM, DEG = 1e3, 180.0 / np.pi
 _AXES = {"x": 0, "y": 1}
 
@@ -28,7 +27,7 @@ class Abscissa:
     label: str
 
 
-def abscissa(dataset: xr.Dataset, name: str | None = None) -> Abscissa:
+def abscissa(dataset: LabelledResult, name: str | None = None) -> Abscissa:
     """The path's coordinate, or another coordinate over postures, in mm or degrees."""
     name = name or str(dataset.attrs["coordinate"])
     variable = dataset[name]
@@ -42,24 +41,24 @@ def abscissa(dataset: xr.Dataset, name: str | None = None) -> Abscissa:
     return Abscissa(values, title if unit == "1" else f"{title} [{unit}]")
 
 
-def labels(dataset: xr.Dataset, dimension: str) -> list[str]:
+def labels(dataset: LabelledResult, dimension: str) -> list[str]:
     """The names along a dimension."""
     return [str(name) for name in np.atleast_1d(dataset[dimension].values)]
 
 
-def world_cops(dataset: xr.Dataset) -> Float[np.ndarray, "N criterion contact 2"]:
+def world_cops(dataset: LabelledResult) -> Float[np.ndarray, "N criterion contact 2"]:
     """Horizontal position of each CoP in the world [mm]."""
     axes = dataset["contact_rotation"].values[:, :2, :2]
     cops = np.einsum("kab,ijkb->ijka", axes, dataset["cop"].values)
     return np.asarray((contact_origins(dataset) / MM + cops) * MM)
 
 
-def contact_origins(dataset: xr.Dataset) -> Float[np.ndarray, "contact 2"]:
+def contact_origins(dataset: LabelledResult) -> Float[np.ndarray, "contact 2"]:
     """Horizontal position of each contact frame in the world [mm]."""
     return np.asarray(dataset["contact_position"].values[:, :2] * MM)
 
 
-def world_soles(dataset: xr.Dataset) -> list[Float[np.ndarray, "k 2"] | None]:
+def world_soles(dataset: LabelledResult) -> list[Float[np.ndarray, "k 2"] | None]:
     """Outline of each sole in the world, seen from above [mm]; None for a contact without one."""
     if "sole_polygon" not in dataset:
         return [None] * dataset.sizes["contact"]
@@ -71,7 +70,7 @@ def world_soles(dataset: xr.Dataset) -> list[Float[np.ndarray, "k 2"] | None]:
     return soles
 
 
-def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
+def edges(dataset: LabelledResult, axis: str) -> list[tuple[float, float] | None]:
     """The two edges of each sole along an axis [mm], level with the middle of its CoPs."""
     cops = world_cops(dataset)[..., 1 - _AXES[axis]]
     found = []
@@ -83,19 +82,8 @@ def edges(dataset: xr.Dataset, axis: str) -> list[tuple[float, float] | None]:
     return found
 
 
-def planted(dataset: xr.Dataset) -> Bool[np.ndarray, "N criterion contact"]:
-    """Where a contact pushes and its CoP is on its sole."""
-    on = dataset["margin"].values > -ON_EDGE  # a limit may hold it on the very edge
-    return np.asarray(on & ~dataset["pulling"].values.astype(bool))
-
-
-def first_to_go(dataset: xr.Dataset) -> Float[np.ndarray, "N criterion"]:
+def first_to_go(dataset: LabelledResult) -> Float[np.ndarray, "N criterion"]:
     """First-order CoM travel to the first contact that tips or unloads [mm]; NaN if none does."""
     both = np.minimum(dataset["com_travel"].values, dataset["unloading_travel"].values)
     least = both.min(axis=2) * MM  # a failed row is NaN on every contact
     return np.asarray(np.where(np.isfinite(least), least, np.nan))
-
-
-def failed(dataset: xr.Dataset) -> Bool[np.ndarray, "N criterion"]:
-    """Which rows have failed."""
-    return np.asarray(dataset["reason"].values != "")

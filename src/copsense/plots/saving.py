@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from copsense.storage import check_output, write_beside
+from copsense.files import check_output, write_beside
 
 SUFFIXES = (".png", ".svg", ".pdf")
 # No date in the file: the same figure is the same file.

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import daqp
 import numpy as np
 import scipy.linalg
-import scipy.optimize
 from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.errors import InfeasibleError, InvalidInputError
 from copsense.limits import Limits, limit_rows
+from copsense.load_problem import LoadProblem
 from copsense.regions.refinement import Point, refine
 from copsense.regions.region import BOX, MERGE, ComRegion, region_between
 from copsense.regions.weight_line import com_axes, gravity_slope
 from copsense.stance import Stance
+from copsense.statics.qp import least_relaxation, linear_minimum
 
 FINEST = 1e-7  # m: tolerances below this ask more than the linear programs resolve
 _NOTHING = 1e-9  # of the weight: conflicts of limits that rounding explains
@@ -24,7 +24,6 @@ _UNSOLVED = (
     "the linear program of a region could not be solved: its limits are too far apart in size. "
     "Bring them nearer to the robot's weight and torques."
 )
-_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the slower solver, in the order tried
 
 
 def com_region(stance: Stance, limits: Limits, *, tolerance: float = 1e-4) -> ComRegion:
@@ -69,7 +68,7 @@ class _Problem:
     def __init__(self, stance: Stance, limits: Limits, axes: Float[np.ndarray, "2 r"]) -> None:
         nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
         all_rows = limit_rows(stance, limits)
-        rows, bound = all_rows.over_forces(stance)
+        rows, bound = all_rows.over_forces(LoadProblem.of(stance))
         self.names = all_rows.names + all_rows.torque_names
         E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
         self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
@@ -85,82 +84,25 @@ class _Problem:
         """A feasible CoM position (2,) [m] that lies farthest along a horizontal direction."""
         r = self.axes.shape[1]
         cost = -direction @ self.axes @ self.N[-r:]
-        y = self._solve_fast(cost)
-        if y is None:
-            y = self._solve(cost)
+        y = linear_minimum(cost, self.A, self.b)
         if y is None:
             self._relax()
-            y = self._solve(cost)
+            y = linear_minimum(cost, self.A, self.b)
         if y is None:
             raise InvalidInputError(_UNSOLVED)
         return np.asarray(self.c0 + self.axes @ (self.x0[-r:] + self.N[-r:] @ y))
 
-    def _solve_fast(self, cost: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"] | None:
-        """The minimum of cost y, if the solver's multipliers l prove it: cost + A' l = 0, l >= 0.
-
-        Then cost y >= -l b for every feasible y, which has to be met.
-        """
-        k, v = self.A.shape
-        y, _, flag, info = daqp.solve(
-            np.zeros((v, v)),
-            cost,
-            self.A,
-            self.b,
-            np.full(k, -1e30),
-            np.zeros(k, dtype=np.int32),
-            primal_tol=1e-11,
-            dual_tol=1e-12,
-            # A linear program as proximal steps, until the steps no longer move.
-            eps_prox=1e-4,
-            eta_prox=1e-12,
-            iter_limit=1000,
-        )
-        if flag != 1 or not np.all(np.isfinite(y)):
-            return None
-        l = np.asarray(info["lam"])
-        proofs = (self.A @ y - self.b, -l, np.abs(cost + self.A.T @ l), cost @ y + l @ self.b)
-        return y if max(float(np.max(p, initial=0.0)) for p in proofs) <= _PROOF else None
-
-    def _solve(self, cost: Float[np.ndarray, " v"]) -> Float[np.ndarray, " v"] | None:
-        """The minimum of cost y by the slower solver; None where it finds none."""
-        for tolerance in _TOLERANCES:  # some faces are too slight for the finest
-            found = _linear_program(cost, self.A, self.b, tolerance)
-            if found.status == 0:
-                return np.asarray(found.x)
-        return None
-
     def _relax(self) -> None:
-        """Give way by what rounding takes, or say which limits are in conflict.
-
-        minimise s subject to A f - s <= b: the least amount by which each limit gives way.
-        """
-        v = self.A.shape[1]
+        """Relax the limits by what rounding takes, or report which are in conflict."""
         soft = 1.0 / self.scale
         soft[len(self.names) :] = 0.0  # the box is no limit
-        A = np.vstack([np.hstack([self.A, -soft[:, None]]), -np.eye(v + 1)[-1:]])
-        b = np.append(self.b, 0.0)
-        found = _linear_program(np.append(np.zeros(v), 1.0), A, b, _TOLERANCES[0])
-        if found.status != 0:
+        found = least_relaxation(self.A, self.b, soft)
+        if found is None:
             raise InvalidInputError(_UNSOLVED)
-        if found.fun <= _NOTHING:
-            self.b = self.b + (found.fun + _PROOF) * soft
+        least, multipliers = found
+        if least <= _NOTHING:
+            self.b = self.b + (least + _PROOF) * soft
             return
-        pressing = np.flatnonzero(found.ineqlin.marginals < -_NOTHING)
+        pressing = np.flatnonzero(multipliers > _NOTHING)
         names = dict.fromkeys(self.names[i] for i in pressing if i < len(self.names))
-        raise InfeasibleError(float(found.fun) * self.weight, tuple(names))
-
-
-def _linear_program(
-    cost: Float[np.ndarray, " v"],
-    A: Float[np.ndarray, "k v"],
-    b: Float[np.ndarray, " k"],
-    tolerance: float,
-) -> scipy.optimize.OptimizeResult:
-    """Minimise cost y subject to A y <= b."""
-    options = {
-        "primal_feasibility_tolerance": tolerance,
-        "dual_feasibility_tolerance": tolerance,
-    }
-    return scipy.optimize.linprog(
-        cost, A, b, bounds=(None, None), method="highs-ds", options=options
-    )
+        raise InfeasibleError(least * self.weight, tuple(names))

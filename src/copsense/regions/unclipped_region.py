@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, limit_rows
+from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
 from copsense.regions.refinement import Point
 from copsense.regions.region import BOX, ComRegion, region_between
 from copsense.regions.weight_line import com_axes, gravity_at
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
-from copsense.statics import StaticEquilibrium, WrenchPolicy, solve_equilibrium
+from copsense.statics import WrenchPolicy, share_load
 
 _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 
@@ -85,17 +88,18 @@ def _held_equilibrium(
             "at this posture. Give a Criterion, or moving=True."
         )
 
-    def solve(step: Point) -> StaticEquilibrium:
-        here = stance.at(stance.q)
-        # Gravity is computed once and kept: here it is that of the weight at another point.
-        here.__dict__["gravity"] = gravity_at(stance, stance.com[:2] + step)
-        return solve_equilibrium(here, criterion)
+    own, nb = LoadProblem.of(stance), stance.robot.base_nv
+
+    def share(step: Point) -> tuple[np.ndarray, np.ndarray]:
+        # The weight at another point, shared at this posture.
+        wrench = gravity_at(stance, stance.com[:2] + step)[:nb]
+        return share_load(stance, criterion, replace(own, base_wrench=wrench))
 
     # A metre along each axis gives the slopes without rounding to speak of.
-    start, ends = solve(np.zeros(2)), [solve(axis) for axis in axes.T]
-    F = np.column_stack([end.forces - start.forces for end in ends])
-    T = np.column_stack([end.torques - start.torques for end in ends])
-    return start.forces, F, start.torques, T
+    (f0, tau0), ends = share(np.zeros(2)), [share(axis) for axis in axes.T]
+    F = np.column_stack([forces - f0 for forces, _ in ends])
+    T = np.column_stack([torques - tau0 for _, torques in ends])
+    return f0, F, tau0, T
 
 
 def _moving_equilibrium(

@@ -1,11 +1,13 @@
 """Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
 
+from copsense.simulation.balance_run import balance
+from copsense.simulation.closed_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
 from copsense.simulation.events import Event, Thresholds
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.odometry import FootOdometry
 from copsense.simulation.physics_settings import PhysicsSettings
-from copsense.simulation.rollout import rollout
+from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.simulation.simulator import (
     AlterableSimulator,
@@ -25,10 +27,12 @@ __all__ = [
     "Noise",
     "PhysicsSettings",
     "Push",
+    "Recording",
     "Scenario",
     "Simulator",
     "SimulatorStoppedError",
     "Snapshot",
     "Thresholds",
+    "balance",
     "rollout",
 ]

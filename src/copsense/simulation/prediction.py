@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.contact import Contact
@@ -18,6 +17,7 @@ from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.simulation.physics_settings import PhysicsSettings
+from copsense.simulation.recording import Recording
 from copsense.stance import Stance
 from copsense.statics import solve_equilibrium
 
@@ -46,10 +46,10 @@ class StaticPrediction:
     how: str
     first_order: float
 
-    def attach(self, dataset: xr.Dataset) -> xr.Dataset:
+    def attach(self, recording: Recording) -> Recording:
         """A recording with this prediction beside it, over a dimension of its own."""
         what = {"units": "m", "long_name": "static centre of pressure along the path, contact axes"}
-        return dataset.assign(
+        dataset = recording.to_xarray().assign(
             static_cop=(("static", "contact", "axis"), self.cops, what),
             static_joint=(
                 ("static", "joint"),
@@ -61,7 +61,8 @@ class StaticPrediction:
                 self.values,
                 {"units": "m", "long_name": "where on the path, from its start"},
             ),
-        ).assign_attrs(
+        )
+        return Recording(dataset).with_attributes(
             static_excursion=self.excursion,
             static_contact=self.contact,
             static_how=self.how,

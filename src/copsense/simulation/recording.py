@@ -1,192 +1,185 @@
-"""Recording: what a rollout saw, as a labelled dataset."""
+"""Recording: what a rollout saw, and what is meant by before a tip, completed, tracked."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from html import escape
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import pinocchio as pin
-import xarray as xr
 
-from copsense._version import __version__
-from copsense.contact import COMPONENT_NAMES
-from copsense.controllers.controller import Command
-from copsense.controllers.target import Target
-from copsense.polygon import padded
+from copsense.labelled import LabelledResult, tidy_table
 from copsense.simulation.events import Event
-from copsense.simulation.simulator import Snapshot
-from copsense.stance import Stance
 
-_LOADED = 1e-3  # share of the weight under which a contact has no centre of pressure
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
-_VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
-    "com": (("com_axis",), "m", "centre of mass, world axes"),
-    "com_target": (("com_axis",), "m", "centre of mass asked for, world axes"),
-    "com_velocity": (("com_axis",), "m/s", "velocity of the centre of mass, world axes"),
-    "wrench": (
-        ("contact", "component"),
-        "N, N m",
-        "measured wrench of the environment on the robot about the contact frame's origin, contact "
-        "axes",
-    ),
-    "wrench_command": (
-        ("contact", "component"),
-        "N, N m",
-        "the wrench that the controller means to cause; NaN where it does not say",
-    ),
-    "torque": (("joint",), "N m", "joint torque applied (force for a prismatic joint)"),
-    "torque_command": (("joint",), "N m", "joint torque commanded"),
-    "configuration": (
-        ("configuration_index",),
-        "m, 1, rad",
-        "base position, quaternion (x, y, z, w), joints",
-    ),
-    "joint_position": (("joint",), "rad, m", "joint position"),
-    "joint_velocity": (("joint",), "rad/s, m/s", "joint velocity"),
-    "tilt": (("contact",), "rad", "angle of the contact frame from its plane"),
-}
+SETTLING = 0.1  # s until the ground has taken up the weight evenly
+_COLUMNS = (
+    "com",
+    "com_target",
+    "com_velocity",
+    "wrench",
+    "wrench_command",
+    "cop",
+    "cop_command",
+    "margin",
+    "tilt",
+    "torque",
+    "torque_command",
+    "joint_position",
+    "joint_velocity",
+)
 
 
-class Recorder:
-    """Collects the rows of one rollout."""
+class Recording(LabelledResult):
+    """What `copsense.simulation.rollout` recorded, from the start to the end of the run.
 
-    def __init__(self, stance: Stance) -> None:
-        """Start an empty record."""
-        self.stance, self._model = stance, stance.robot.model
-        self._data = self._model.createData()
-        self._rows: dict[str, list[Any]] = {name: [] for name in ("time", *_VARIABLES)}
-        self._joints = [(j.idx_q, j.nq == 2) for j in list(self._model.joints)[2:] if j.nv == 1]
+    ``recording["cop"]`` is a labelled array over ``time`` and ``contact, axis, component, joint,
+    com_axis``. A row is the state at its time and the wrenches of the step after it. A robot is
+    judged by the part before the first contact tips, lifts or slips, `before_first_tip`: what is
+    measured later, in a fall, says nothing about the controller.
+    """
 
-    def __len__(self) -> int:
-        """Rows so far."""
-        return len(self._rows["time"])
+    _needs: ClassVar = ("time", "com", "com_target", "wrench", "cop", "torque", "tip_com")
+    _needs_attributes: ClassVar = ("end_kind", "end_reason", "end_time", "tip_kind", "tip_time")
+    _what: ClassVar = "a recording"
+    _made_by: ClassVar = "copsense.simulation.rollout"
+    _command: ClassVar = "copsense balance ... --output FILE.nc"
 
-    def add(
-        self,
-        at: Snapshot,
-        after: Snapshot,
-        target: Target,
-        command: Command,
-        torques: np.ndarray,
-        tilts: np.ndarray,
-    ) -> None:
-        """Add a row: the state at a time, and the wrenches during the step that followed it."""
-        com = pin.centerOfMass(self._model, self._data, at.q, at.v)
-        none = np.full(after.wrenches.shape, np.nan)
-        row = {
-            "time": at.time,
-            "com": np.array(com),
-            "com_target": target.com,
-            "com_velocity": np.array(self._data.vcom[0]),
-            "wrench": after.wrenches,
-            "wrench_command": none if command.wrenches is None else command.wrenches,
-            "torque": np.array(torques),
-            "torque_command": command.torques,
-            "configuration": at.q,
-            "joint_position": [
-                np.arctan2(at.q[i + 1], at.q[i]) if circle else at.q[i]
-                for i, circle in self._joints
-            ],
-            "joint_velocity": at.v[6:],
-            "tilt": tilts,
-        }
-        for name, value in row.items():
-            self._rows[name].append(value)
+    __slots__ = ()
 
-    def dataset(self, end: Event, tip: Event | None, tip_com: np.ndarray | None) -> xr.Dataset:
-        """The record; `end` says why it ends, `tip` which contact first ceased to stand."""
-        stance = self.stance
-        data: dict[str, Any] = {
-            name: (("time", *dims), np.array(self._rows[name]), {"units": unit, "long_name": what})
-            for name, (dims, unit, what) in _VARIABLES.items()
-        }
-        cops, margins = _cops(stance, data["wrench"][1])
-        data["cop"] = (
-            ("time", "contact", "axis"),
-            cops,
-            {"units": "m", "long_name": "measured centre of pressure, contact axes"},
+    @property
+    def end(self) -> Event:
+        """How the run ended; its kind is ``"completed"`` where nothing ended it early."""
+        attributes = self.attrs
+        kind, reason = str(attributes["end_kind"]), str(attributes["end_reason"])
+        return Event(kind, float(attributes["end_time"]), reason)
+
+    @property
+    def tip(self) -> Event | None:
+        """The first contact that tipped, lifted or slipped; None where every contact stood."""
+        attributes = self.attrs
+        if not attributes["tip_kind"]:
+            return None
+        return Event(
+            str(attributes["tip_kind"]),
+            float(attributes["tip_time"]),
+            str(attributes.get("tip_reason", "")),
+            str(attributes.get("tip_contact", "")),
         )
-        data["cop_command"] = (
-            ("time", "contact", "axis"),
-            _cops(stance, data["wrench_command"][1])[0],
-            {"units": "m", "long_name": "commanded centre of pressure, contact axes"},
-        )
-        data["margin"] = (
-            ("time", "contact"),
-            margins,
-            {"units": "m", "long_name": "distance of the CoP to the sole's nearest edge"},
-        )
-        data |= _ground(stance)
-        nan = np.full(3, np.nan)
-        data["tip_com"] = (
-            "com_axis",
-            nan if tip_com is None else tip_com,
-            {"units": "m", "long_name": "centre of mass when a contact first ceased to stand"},
-        )
-        coordinates = {
-            "time": ("time", np.array(self._rows["time"]), {"units": "s", "long_name": "time"}),
-            "contact": list(stance.contact_names),
-            "axis": ["x", "y"],
-            "com_axis": ["x", "y", "z"],
-            "contact_axis": ["x", "y", "z"],
-            "component": list(COMPONENT_NAMES),
-            "joint": list(stance.robot.torque_names),
-        }
-        attributes = {
-            "title": f"Balancing of {stance.robot.name}",
-            "source": f"copsense {__version__}",
-            "robot": stance.robot.name,
-            "mass": stance.robot.mass,
-            "weight": stance.robot.weight,
-            "end_kind": end.kind,
-            "end_reason": end.message,
-            "end_time": end.time,
-            "tip_kind": tip.kind if tip else "",
-            "tip_contact": tip.contact if tip else "",
-            "tip_reason": tip.message if tip else "",
-            "tip_time": tip.time if tip else np.nan,
-            "conventions": "SI units, radians, world z up; wrenches are what the environment does "
-            "to the robot, force first; base velocity in the base's frame",
-        }
-        return xr.Dataset(data, coordinates, attributes)
 
+    @property
+    def completed(self) -> bool:
+        """Whether the run went to the scenario's end, on whichever contacts."""
+        return self.end.kind == "completed"
 
-def _cops(stance: Stance, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Centres of pressure (N, nc, 2), NaN where unloaded, and their margins (N, nc)."""
-    wrenches = wrenches.reshape(-1, len(stance.contacts), 6)
-    loaded = wrenches[:, :, 2] > _LOADED * stance.robot.weight
-    fz = np.where(loaded, wrenches[:, :, 2], np.nan)
-    cops = np.stack([-wrenches[:, :, 4] / fz, wrenches[:, :, 3] / fz], axis=2)
-    margins = np.full(cops.shape[:2], np.nan)
-    for k, contact in enumerate(stance.contacts):
-        if contact.sole:
-            margins[:, k] = contact.sole.margins(cops[:, k])
-    return cops, margins
+    @property
+    def before_first_tip(self) -> Recording:
+        """The rows whose step ended before the first contact tipped, or with it; else all.
 
+        The first row is kept where the contact tipped in its very step.
+        """
+        tip = self.tip
+        if tip is None:
+            return self
+        time = self["time"].values
+        return self._rows((time < tip.time) | (time == time[0]))
 
-def _ground(stance: Stance) -> dict[str, Any]:
-    """Where the contacts stand, as a sweep says it."""
-    places = stance.placements
-    found: dict[str, Any] = {
-        "contact_position": (
-            ("contact", "com_axis"),
-            np.array([p.translation for p in places]),
-            {"units": "m", "long_name": "origin of the contact frame, world axes"},
-        ),
-        "contact_rotation": (
-            ("contact", "com_axis", "contact_axis"),
-            np.array([p.rotation for p in places]),
-            {"units": "1", "long_name": "columns: contact axes in world axes"},
-        ),
-    }
-    soles = [c.sole for c in stance.contacts]
-    if any(soles):
-        found["sole_polygon"] = (
-            ("contact", "vertex", "axis"),
-            padded(soles),
-            {
-                "units": "m",
-                "long_name": "vertices of the sole, contact axes, last one repeated; NaN if none",
-            },
+    @property
+    def settled(self) -> Recording:
+        """The rows from `SETTLING` on, when the ground has taken up the weight.
+
+        A shorter recording has all its rows but the first, which has no contact force yet.
+        """
+        time = self["time"].values
+        late = time >= time[0] + SETTLING
+        if np.count_nonzero(late) < 2 and len(time) > 1:
+            late = np.arange(len(time)) > 0
+        return self._rows(late) if np.any(late) else self
+
+    @property
+    def tracking_error(self) -> float:
+        """Root mean square of CoM y minus its target before the first tip [m]."""
+        return float(np.sqrt(np.mean(self._error_y() ** 2)))
+
+    @property
+    def tracking_peak(self) -> float:
+        """Largest distance of CoM y from its target before the first tip [m]."""
+        return float(np.abs(self._error_y()).max())
+
+    @property
+    def tip_travel(self) -> float:
+        """CoM y from its start when the first contact tipped [m]; NaN where none did."""
+        return float(self["tip_com"].sel(com_axis="y") - self["com"].sel(com_axis="y")[0])
+
+    @property
+    def smallest_margin(self) -> dict[str, float]:
+        """Contact -> smallest distance of its CoP to the sole's edge before the first tip [m].
+
+        NaN for a contact without a sole, or that never carried load.
+        """
+        margin = self.before_first_tip["margin"].min("time")
+        return dict(zip(self.labels("contact"), map(float, margin.values), strict=True))
+
+    def between(self, start: float, stop: float) -> Recording:
+        """The rows from one time to another, both included [s]."""
+        time = self["time"].values
+        return self._rows((time >= start) & (time <= stop))
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A tidy table: a row per time and contact."""
+        return tidy_table(self._dataset, ("time", "contact"), ("time", "contact"), _COLUMNS)
+
+    def plot(self) -> Figure:
+        """The recording on one page, `copsense.plots.plot_rollout`."""
+        from copsense.plots import plot_rollout
+
+        return plot_rollout(self)
+
+    def __repr__(self) -> str:
+        """Robot, controller, how it ended, tracking and margins."""
+        return "\n".join([f"<copsense.Recording of {self._heading()}", *self._lines()]) + ">"
+
+    def _repr_html_(self) -> str:
+        """The same with xarray's own view folded away, for notebooks."""
+        lines = "".join(f"<div>{escape(line)}</div>" for line in self._lines())
+        return (
+            f"<div><strong>Recording of {escape(self._heading())}</strong>{lines}"
+            f"<details><summary>dataset</summary>{self._dataset._repr_html_()}</details></div>"
         )
-    return found
+
+    def _heading(self) -> str:
+        attributes = self.attrs
+        return (
+            f"{attributes.get('robot', 'a robot')} under "
+            f"{attributes.get('controller', 'a controller')}, {self.end.time:.2f} s"
+        )
+
+    def _lines(self) -> list[str]:
+        """What the representation says under its heading."""
+        tip, end = self.tip, self.end
+        lines = [f"  end: {end.message}"]
+        if tip is not None:
+            lines.append(
+                f"  first tip at {tip.time:.2f} s, CoM y {self.tip_travel * 1e3:+.1f} mm from the "
+                f"start: {tip.message}"
+            )
+        lines.append(
+            f"  CoM y error {self.tracking_error * 1e3:.3f} mm rms, "
+            f"{self.tracking_peak * 1e3:.3f} mm at most"
+        )
+        known = {n: m for n, m in self.smallest_margin.items() if math.isfinite(m)}
+        if known:
+            least = min(known, key=known.__getitem__)
+            lines.append(f"  smallest margin {known[least] * 1e3:+.1f} mm, of {least}")
+        return lines
+
+    def _error_y(self) -> np.ndarray:
+        stood = self.before_first_tip
+        error = stood["com"] - stood["com_target"]
+        return np.asarray(error.sel(com_axis="y").values)
+
+    def _rows(self, flags: np.ndarray) -> Recording:
+        return Recording(self._dataset.isel(time=np.flatnonzero(flags)))

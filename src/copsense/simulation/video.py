@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 
 from copsense.errors import InvalidInputError, MissingExtraError, OutputError
+from copsense.files import check_output, write_beside
 from copsense.simulation.mujoco_simulator import load_mujoco
+from copsense.simulation.recording import Recording
 from copsense.stance import Stance
-from copsense.storage import check_output, write_beside
 
 _RATE = 25  # frames a second
 _WIDE, _HIGH = 640, 640
@@ -34,7 +34,7 @@ _LINK, _FOOT, _COP, _COM = (
 
 def write_video(
     stance: Stance,
-    recording: xr.Dataset,
+    recording: Recording,
     path: str | Path,
     *,
     overwrite: bool = False,
@@ -147,7 +147,7 @@ def _renderer(model: Any) -> Iterator[Any]:
 
 
 @contextmanager
-def _screen(stance: Stance) -> Iterator[Callable[[xr.Dataset, int], np.ndarray]]:
+def _screen(stance: Stance) -> Iterator[Callable[[Recording, int], np.ndarray]]:
     mujoco, model = load_mujoco(), stance.robot.model
     scene_model, data = _scene(), model.createData()
     scene_data = mujoco.MjData(scene_model)
@@ -164,7 +164,7 @@ def _screen(stance: Stance) -> Iterator[Callable[[xr.Dataset, int], np.ndarray]]
 
     with _renderer(scene_model) as renderer:
 
-        def draw(recording: xr.Dataset, row: int) -> np.ndarray:
+        def draw(recording: Recording, row: int) -> np.ndarray:
             pin.forwardKinematics(model, data, recording["configuration"].values[row])
             renderer.update_scene(scene_data, camera)
             scene = renderer.scene

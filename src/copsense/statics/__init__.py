@@ -5,6 +5,7 @@ from __future__ import annotations
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
+from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
 from copsense.statics.constrained import (
     ActiveLimit,
@@ -14,7 +15,13 @@ from copsense.statics.constrained import (
     distance_to_change,
     solve_constrained,
 )
-from copsense.statics.equilibrium import PROJECT, StaticEquilibrium, is_admissible, solve_static
+from copsense.statics.equilibrium import (
+    PROJECT,
+    StaticEquilibrium,
+    is_admissible,
+    share_load,
+    solve_static,
+)
 from copsense.statics.policy import WrenchPolicy, policy_name, wrench_policy
 
 __all__ = [
@@ -22,12 +29,14 @@ __all__ = [
     "ActiveLimit",
     "ActiveSetChange",
     "ConstrainedEquilibrium",
+    "LoadProblem",
     "Rates",
     "StaticEquilibrium",
     "WrenchPolicy",
     "distance_to_change",
     "is_admissible",
     "policy_name",
+    "share_load",
     "solve_equilibrium",
     "wrench_policy",
 ]
@@ -48,14 +57,14 @@ def solve_equilibrium(
     Raises:
         UndeterminedWrenchError: several wrenches are equally good; the message names them.
         InfeasibleError: no wrench respects the limits.
-        InvalidInputError: weights that do not fit, a law whose wrenches do not balance gravity, or
-            a law together with limits.
+        InvalidInputError: weights that do not fit, a policy whose wrenches do not balance gravity,
+            or a policy together with limits.
     """
     if limits is None or not limits.any:
         return solve_static(stance, criterion)
     if not isinstance(criterion, Criterion):
         raise InvalidInputError(
-            "limits apply to a Criterion; a law q -> wrenches has to respect them itself. Leave "
+            "limits apply to a Criterion; a policy q -> wrenches has to respect them itself. Leave "
             "limits out, and look at its margins."
         )
     return solve_constrained(stance, criterion, limits)

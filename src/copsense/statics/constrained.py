@@ -2,11 +2,11 @@
 
 Over the contact forces alone, tau = G_j - J_j' f, a criterion within limits is the QP
 
-    minimise 1/2 f' H f - g' f   subject to   J_b' f = G_b,   A f <= b,
-    H = J_j W_tau J_j' + W_f,    g = J_j W_tau G_j + W_f f_ref,
+    minimise 1/2 f' H f - g' f   subject to   J_b' f = G_b,   A f <= b
 
-with a row of A for each contact limit and, for a torque limit |tau_i| <= t_i, the rows
--/+ J_i' f <= t_i -/+ G_i. With the active rows held, f and its multipliers solve
+with H and g of `Quadratic.over_forces`, a row of A for each contact limit and, for a torque limit
+|tau_i| <= t_i, the rows -/+ J_i' f <= t_i -/+ G_i. With the active rows held, f and its
+multipliers solve
 
     [ 0     J_b'   0  ] [nu_b]   [ G_b ]
     [ J_b  -H    -A_a'] [ f  ] = [ -g  ]
@@ -19,13 +19,13 @@ own: same cost, the pressing rows held, and the weak ones not to be crossed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.criterion import Criterion, Quadratic
+from copsense.arrays import owned
+from copsense.criterion import Criterion
 from copsense.errors import (
     InfeasibleError,
     InvalidInputError,
@@ -33,14 +33,16 @@ from copsense.errors import (
     UnsolvedError,
 )
 from copsense.limits import LimitRows, Limits, limit_rows
+from copsense.load_problem import LoadProblem
+from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 from copsense.statics.equilibrium import StaticEquilibrium
-from copsense.statics.qp import NoPointError, Program
+from copsense.statics.program import NoPointError, Program
 
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
 _RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
-_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that is no approach
+_CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that does not count
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
 
 
@@ -72,7 +74,7 @@ class ActiveSetChange:
     Attributes:
         name: the limit's name.
         kind: as of `ActiveLimit`.
-        binds: whether it begins to bind; False where it lets go.
+        binds: whether it begins to bind; False where it ceases to.
         travel: how far along the motion, in units of it.
     """
 
@@ -99,7 +101,7 @@ class Rates:
     slack: Float[np.ndarray, " r"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ConstrainedEquilibrium(StaticEquilibrium):
     """An equilibrium within limits; see `StaticEquilibrium` for the rest.
 
@@ -116,6 +118,19 @@ class ConstrainedEquilibrium(StaticEquilibrium):
     kinds: tuple[str, ...]
     slack: Float[np.ndarray, " r"]
     row_multipliers: Float[np.ndarray, " r"]
+    _problem: _Problem = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        super().__post_init__()
+        for name in ("slack", "row_multipliers"):
+            object.__setattr__(self, name, owned(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        """As `StaticEquilibrium`, with the active limits."""
+        active = ", ".join(limit.name for limit in self.active[:4]) or "none"
+        more = f" and {len(self.active) - 4} more" if len(self.active) > 4 else ""
+        return f"{super().__repr__()[:-1]}; active limits: {active}{more})"
 
     @property
     def active(self) -> tuple[ActiveLimit, ...]:
@@ -132,7 +147,9 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         Balance and limits in shares of the weight, stationarity and complementarity in shares of
         the cost's gradient; recomputed from the stance.
         """
-        return self._problem.optimality(self)
+        base = self.stance.robot.base_nv
+        program = _Problem(self.stance, self._criterion, self.limits).program
+        return program.violation(self.forces, self.multipliers[:base], self.row_multipliers)
 
     def derivative(
         self, directions: Float[np.ndarray, "nv p"]
@@ -177,10 +194,10 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         i = int(np.argmin(travel))
         return ActiveSetChange(self.names[i], self.kinds[i], not strong[i], float(travel[i]))
 
-    @cached_property
-    def _problem(self) -> _Problem:
+    @property
+    def _criterion(self) -> Criterion:
         assert isinstance(self.criterion, Criterion)
-        return _Problem(self.stance, self.criterion, self.limits)
+        return self.criterion
 
 
 def solve_constrained(
@@ -200,21 +217,19 @@ def solve_constrained(
     """
     problem = _Problem(stance, criterion, limits)
     f, nu, multipliers, slack = problem.solve()
-    torques = (stance.gravity - stance.jacobian.T @ f)[stance.robot.base_nv :]
-    found = ConstrainedEquilibrium(
+    return ConstrainedEquilibrium(
         stance,
         criterion,
         f,
-        torques,
+        problem.load.torques(f),
         nu,
         limits,
         problem.names,
         problem.kinds,
         slack,
         multipliers,
+        _problem=problem,
     )
-    found.__dict__["_problem"] = problem
-    return found
 
 
 def distance_to_change(
@@ -239,15 +254,13 @@ class _Problem:
 
     def __init__(self, stance: Stance, criterion: Criterion, limits: Limits) -> None:
         self.stance, self.criterion = stance, criterion
-        self.nb = nb = stance.robot.base_nv
-        self.Jb, self.Jj = stance.jacobian[:, :nb], stance.jacobian[:, nb:]
-        self.Gb, self.Gj = stance.gravity[:nb], stance.gravity[nb:]
+        self.nb, self.weight = stance.robot.base_nv, stance.robot.weight
+        self.load = load = LoadProblem.of(stance)
         self.quadratic: Quadratic = criterion.at(stance)
-        self.W = _torque_weight(self.quadratic, stance)
-        self.H = self.Jj @ self.W @ self.Jj.T + self.quadratic.wrench
-        self.g = self.Jj @ self.W @ self.Gj + self.quadratic.pull
+        self.W = self.quadratic.torque_weight(load)
+        self.H, self.g = self.quadratic.over_forces(load)
         rows: LimitRows = limit_rows(stance, limits)
-        self.A, self.b = rows.over_forces(stance)
+        self.A, self.b = rows.over_forces(load)
         # A contact's row has no joint, and no sign.
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
@@ -259,8 +272,8 @@ class _Problem:
         self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
         self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(rows.joint)
-        self.weight = stance.robot.weight
-        self.program = Program(self.H, self.g, self.Jb, self.Gb, self.A, self.b, self.weight)
+        E, e = load.base_map.T, load.base_wrench
+        self.program = Program(self.H, self.g, E, e, self.A, self.b, self.weight)
         self.scale = self.program.scale
         self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
 
@@ -280,27 +293,19 @@ class _Problem:
             demands = dict.fromkeys(self.names[i] for i in error.rows)
             raise InfeasibleError(error.violation, tuple(demands)) from None
         f, multipliers = found.x, found.multipliers
-        slack = self.b - self.A @ f
-        gradient = max(float(np.abs(self.H @ f - self.g).max()), 1e-300)
+        slack = self.b - self.A.dot(f)
+        gradient = max(float(np.abs(self.H.dot(f) - self.g).max()), 1e-300)
         touching = slack <= _TOUCHING * self.weight * self.scale
         self.strong = multipliers * self.scale > _PRESSING * gradient
         self.weak = touching & ~self.strong
         multipliers[~self.strong] = 0.0
         slack[self.strong] = 0.0
-        tau = self.Gj - self.Jj.T @ f
-        nu = np.zeros(len(self.Gb) + len(self.Gj))
-        nu[self.nb :] = self.W @ tau
-        np.add.at(
-            nu, self.nb + self.joint[self.joint >= 0], (self.sign * multipliers)[self.joint >= 0]
-        )
-        contact = self.joint < 0
-        left = (
-            self.quadratic.wrench @ f
-            - self.quadratic.pull
-            + self.A[contact].T @ multipliers[contact]
-            - self.Jj @ nu[self.nb :]
-        )
-        nu[: self.nb] = np.linalg.lstsq(self.Jb, left, rcond=None)[0]
+        # Stationarity: J nu = W_f (f - f_ref) + A_c' l, with nu_j = W tau + s l.
+        nu = np.zeros(self.nb + len(self.load.torque_offset))
+        nu[: self.nb] = found.equality
+        nu[self.nb :] = self.W.dot(self.load.torques(f))
+        torque = self.joint >= 0
+        np.add.at(nu, self.nb + self.joint[torque], (self.sign * multipliers)[torque])
         return f, nu, multipliers, slack
 
     def differentiate(
@@ -309,7 +314,7 @@ class _Problem:
         """d f, d tau and d l of the held rows along V, with these rows held."""
         base, joints, change, bound = self._rates_of_data(at, V)
         df, _, dl = self.program.hold(held, change, base, bound[held])
-        return df, joints - self.Jj.T @ df, dl
+        return df, joints - self.load.joint_map.dot(df), dl
 
     def _rates_of_data(
         self, at: ConstrainedEquilibrium, V: np.ndarray
@@ -318,32 +323,28 @@ class _Problem:
 
         The first in two parts, base and joints; the second with the multipliers' part.
         """
-        AV = self.stance.balance_derivative(at.forces) @ V
+        AV = self.stance.balance_derivative(at.forces).dot(V)
         base, joints = AV[: self.nb], AV[self.nb :]
-        # Stationarity: J nu = W_f (f - f_ref) + A_c' l, nu_j = W tau + s l, here at fixed f and l.
-        change = self.stance.motion_derivative(at.multipliers) @ V + self.Jj @ (self.W @ joints)
+        weighted = self.W.dot(joints)
         if self.quadratic.inertia:
-            change += self.Jj @ self._weight_change(at.torques, V)
+            weighted = weighted + self.quadratic.torque_weight_derivative(
+                self.stance, self.load, at.torques
+            ).dot(V)
+        change = self.stance.motion_derivative(at.multipliers).dot(V)
+        change += self.load.joint_map.T.dot(weighted)
         bound = np.zeros((len(self.b), V.shape[1]))
         torque = self.joint >= 0
         bound[torque] = -self.sign[torque, None] * joints[self.joint[torque]]
         return base, joints, change, bound
 
-    def _weight_change(self, torques: np.ndarray, V: np.ndarray) -> np.ndarray:
-        """(dW) tau for W = D + c M^-1: -c M^-1 dM M^-1 tau."""
-        nb = self.nb
-        M = self.stance.mass_matrix[nb:, nb:]
-        inner = np.zeros(nb + len(torques))
-        inner[nb:] = np.linalg.solve(M, torques)
-        moved = self.stance.inertia_derivative(inner)[nb:] @ V
-        return -self.quadratic.inertia * np.linalg.solve(M, moved)
-
     def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
         """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
         base, joints, c, bound = (x[:, 0] for x in self._rates_of_data(at, v[:, None]))
-        E, e = np.hstack([self.Jb, self.A[strong].T]), np.concatenate([base, bound[strong]])
-        size = float(np.abs(self.differentiate(at, v[:, None], strong)[0]).max())
+        E = np.hstack([self.load.base_map.T, self.A[strong].T])
+        e = np.concatenate([base, bound[strong]])
+        pressed = self.program.hold(strong, c, base, bound[strong])[0]
+        size = float(np.abs(pressed).max())
         unit = max(size if np.isfinite(size) else 0.0, float(np.abs(e).max()), 1e-300)
         try:
             found = Program(
@@ -361,34 +362,4 @@ class _Problem:
         slack = bound - self.A @ df
         slack[strong] = 0.0
         slack[multipliers != 0] = 0.0
-        return Rates(df, joints - self.Jj.T @ df, multipliers, slack)
-
-    def optimality(self, at: ConstrainedEquilibrium) -> float:
-        f, l = at.forces, at.row_multipliers
-        gradient = self.H @ f - self.g
-        size = max(float(np.abs(gradient).max()), 1e-9 * self.weight * float(np.abs(self.H).max()))
-        pressing = gradient + self.A.T @ l
-        # What the rows leave of the gradient must be a combination of the balance's rows.
-        left = pressing - self.Jb @ np.linalg.lstsq(self.Jb, pressing, rcond=None)[0]
-        slack = (self.b - self.A @ f) / self.scale
-        parts = [
-            np.abs(left).max() / size,
-            np.abs(self.Jb.T @ f - self.Gb).max() / self.weight,
-            np.max(-slack, initial=0.0) / self.weight,
-            np.max(-l * self.scale, initial=0.0) / size,
-            np.max(np.abs(l * self.scale * slack), initial=0.0) / (size * self.weight),
-        ]
-        return float(max(parts))
-
-
-def _torque_weight(quadratic: Quadratic, stance: Stance) -> Float[np.ndarray, "n n"]:
-    if not quadratic.inertia:
-        return quadratic.torque
-    nb = stance.robot.base_nv
-    M = stance.mass_matrix[nb:, nb:]
-    if np.linalg.cond(M) > 1e12:
-        raise InvalidInputError(
-            "a weight that follows the inertia needs every joint to move some mass when limits are "
-            "on. Give constant weights instead."
-        )
-    return quadratic.torque + quadratic.inertia * np.linalg.inv(M)
+        return Rates(df, joints - self.load.joint_map @ df, multipliers, slack)

@@ -3,34 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense import rigid_body
-from copsense.arrays import finite_array
+from copsense.arrays import array_property, finite_array, owned
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
+from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
-from copsense.statics.policy import BALANCE, WrenchPolicy, imbalance, policy_forces
+from copsense.statics.policy import BALANCE, WrenchPolicy, policy_forces, policy_name
 
 UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
 PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class StaticEquilibrium:
     """A stance at rest: the contact wrenches and joint torques that hold it.
 
     Attributes:
         stance: the stance.
-        criterion: what chose the wrenches; a `Criterion` or a user's law q -> wrenches.
+        criterion: what chose the wrenches; a `Criterion` or a `WrenchPolicy`, q -> wrenches.
         forces: stacked contact forces (m,), contact axes [N, Nm].
         torques: joint torques (n,) [Nm, or N for a prismatic joint].
-        multipliers: nu (nv,), the sensitivity of the cost to the gravity terms; zero for a law.
+        multipliers: nu (nv,), the sensitivity of the cost to the gravity terms; zero for a policy.
     """
 
     stance: Stance
@@ -38,8 +38,30 @@ class StaticEquilibrium:
     forces: Float[np.ndarray, " m"]
     torques: Float[np.ndarray, " n"]
     multipliers: Float[np.ndarray, " nv"]
+    # Factorised once, for the values and their derivatives.
+    _system: Kkt | None = field(default=None, kw_only=True)
 
-    @property
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        for name in ("forces", "torques", "multipliers"):
+            object.__setattr__(self, name, owned(getattr(self, name)))
+
+    def __repr__(self) -> str:
+        """Criterion, robot and each contact's share of the weight."""
+        criterion, robot = self.criterion, self.stance.robot
+        name = criterion.name if isinstance(criterion, Criterion) else policy_name(criterion)
+        shares = ", ".join(
+            f"{contact} {share:.1%}"
+            for contact, share in zip(
+                self.stance.contact_names, self.wrenches[:, 2] / robot.weight, strict=True
+            )
+        )
+        return (
+            f"{type(self).__name__}({name} on {robot.name!r}; load {shares}; "
+            f"largest torque {np.abs(self.torques).max(initial=0.0):.4g})"
+        )
+
+    @array_property
     def wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """Wrench of the environment on the robot at each contact [N, Nm].
 
@@ -88,19 +110,16 @@ class StaticEquilibrium:
         """
         if not isinstance(self.criterion, Criterion):
             raise InvalidInputError(
-                "a law has no analytic derivative. Use cop_sensitivity, which differentiates it "
+                "a policy has no analytic derivative. Use cop_sensitivity, which differentiates it "
                 "numerically."
             )
-        nv = self.stance.robot.model.nv
-        directions = finite_array(directions, "the directions", (nv, None), "columns with J V = 0")
-        if not is_admissible(self.stance, directions):
-            raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
-        return self._system.derivative(self, directions)
-
-    @cached_property
-    def _system(self) -> Kkt:
-        assert isinstance(self.criterion, Criterion)
-        return Kkt(self.stance, self.criterion)
+        if directions is not self.stance.admissible_motions:
+            nv, columns = self.stance.robot.model.nv, "columns with J V = 0"
+            directions = finite_array(directions, "the directions", (nv, None), columns)
+            if not is_admissible(self.stance, directions):
+                raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
+        system = self._system or Kkt(self.stance, self.criterion)
+        return system.derivative(self, directions)
 
     def _where(self, test: Callable[[float], bool]) -> tuple[str, ...]:
         normal = self.wrenches[:, 2]
@@ -118,22 +137,51 @@ def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticE
 
     Raises:
         UndeterminedWrenchError: several wrenches are equally good; the message names them.
-        InvalidInputError: weights that do not fit, or a law whose wrenches do not balance gravity.
+        InvalidInputError: weights that do not fit, or a policy whose wrenches do not balance
+            gravity.
     """
     if not isinstance(criterion, Criterion):
         forces = policy_forces(stance, criterion)
-        torques = (stance.gravity - stance.jacobian.T @ forces)[stance.robot.base_nv :]
+        torques = LoadProblem.of(stance).torques(forces)
         return StaticEquilibrium(stance, criterion, forces, torques, np.zeros_like(stance.gravity))
     system = Kkt(stance, criterion)
-    equilibrium = StaticEquilibrium(stance, criterion, *system.solution)
-    if not imbalance(stance, equilibrium.forces) <= BALANCE * stance.robot.weight:
+    forces, torques, nu = _balanced(system, criterion, system.problem)
+    return StaticEquilibrium(stance, criterion, forces, torques, nu, _system=system)
+
+
+def share_load(
+    stance: Stance, criterion: Criterion, problem: LoadProblem
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"]]:
+    """The forces and torques that a criterion chooses for another load than the stance's own.
+
+    Args:
+        stance: robot, configuration and contacts.
+        criterion: what shares the load.
+        problem: ``LoadProblem.of(stance)`` with another base wrench or torque offset, such as
+            those of the weight with the centre of mass elsewhere.
+
+    Returns:
+        Stacked forces (m,) and torques (n,).
+
+    Raises:
+        UndeterminedWrenchError: several wrenches are equally good; the message names them.
+        InvalidInputError: weights that do not fit.
+    """
+    forces, torques, _ = _balanced(Kkt(stance, criterion), criterion, problem)
+    return forces, torques
+
+
+def _balanced(
+    system: Kkt, criterion: Criterion, problem: LoadProblem
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The system's solution of a load, validated."""
+    found = system.share(problem)
+    if not problem.imbalance(found[0]) <= BALANCE * system.stance.robot.weight:
         raise InvalidInputError(
             f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
             "its weights are too large, too small or too far apart. Bring them nearer to one."
         )
-    # Kept for the derivatives, which use the same factorisation.
-    equilibrium.__dict__["_system"] = system
-    return equilibrium
+    return found
 
 
 def is_admissible(stance: Stance, directions: np.ndarray) -> bool:

@@ -14,11 +14,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.linalg
 from jaxtyping import Float
+from scipy.linalg import lapack
 
-from copsense.criterion import Criterion, Quadratic
+from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
 
 if TYPE_CHECKING:
@@ -33,15 +34,18 @@ class Kkt:
     """The KKT matrix of a stance and a criterion, factorised."""
 
     def __init__(self, stance: Stance, criterion: Criterion) -> None:
-        """Lay the matrix out, factorise it and solve for the wrenches."""
-        self.stance, self.nb = stance, stance.robot.base_nv
-        self.quadratic = criterion.at(stance)
-        J, G = stance.jacobian, stance.gravity
-        on = np.concatenate([np.ones(self.nb, bool), self.quadratic.active()])
-        self.on, self.size = on, int(on.sum())
-        P = np.zeros((self.size, self.size))
-        P[self.nb :, self.nb :] = self.quadratic.compliance(stance)
-        self.matrix = np.block([[P, J[:, on].T], [J[:, on], -self.quadratic.wrench]])
+        """Lay the matrix out and factorise it."""
+        self.stance, self.problem = stance, LoadProblem.of(stance)
+        self.nb, self.quadratic = stance.robot.base_nv, criterion.at(stance)
+        J, quadratic = stance.jacobian, self.quadratic
+        self.on = np.concatenate([np.ones(self.nb, bool), quadratic.active])
+        self.size = size = int(self.on.sum())
+        self.matrix = K = np.zeros((size + len(J), size + len(J)))
+        if size > self.nb:
+            K[self.nb : size, self.nb : size] = quadratic.compliance(self.problem)
+        K[size:, :size] = J[:, self.on]
+        K[:size, size:] = K[size:, :size].T
+        K[size:, size:] = -quadratic.wrench
         self.free = np.zeros((len(J), 0))
         self._factorise()
         self.tie = None
@@ -49,21 +53,35 @@ class Kkt:
             if criterion.tie_break is None:
                 raise UndeterminedWrenchError(*_undetermined(stance, criterion, self.free))
             self.tie = TieBreak(self, criterion)
-        x = self.solve(np.concatenate([G[on], -self.quadratic.pull]))
+
+    def share(
+        self, problem: LoadProblem
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"], Float[np.ndarray, " nv"]]:
+        """Forces, torques and multipliers nu of a load.
+
+        Args:
+            problem: the stance's own, or one with another base wrench or torque offset.
+        """
+        load = np.concatenate([problem.base_wrench, problem.torque_offset])
+        x = self.solve(np.concatenate([load[self.on], -self.quadratic.pull]))
         if self.tie:
-            x[self.size :] += self.tie.move(x[self.size :])
-        self.solution = self._unpack(x)
+            x[self.size :] += self.tie.move(problem, x[self.size :])
+        nu = np.zeros(len(self.on))
+        nu[self.on], forces = x[: self.size], x[self.size :]
+        return forces, problem.torques(forces), nu
 
     def _factorise(self) -> None:
         # Weights of any unit (1/limit^2, say) are brought to a common size first: s K s.
-        self.scale = np.ones(len(self.matrix))
+        entries = np.abs(self.matrix)
+        scale = np.ones(len(entries))
         for _ in range(3):
-            rows = np.abs(self.scaled).max(axis=1)
-            self.scale /= np.sqrt(np.where(rows > 0, rows, 1.0))
-        scaled = self.scaled
-        lu, pivots, info = scipy.linalg.lapack.dgetrf(scaled)
+            rows = scale * (entries * scale).max(axis=1)
+            scale /= np.sqrt(np.where(rows > 0, rows, 1.0))
+        self.scale = scale
+        scaled = scale[:, None] * self.matrix * scale
+        lu, pivots, info = lapack.dgetrf(scaled)
         norm = np.abs(scaled).sum(axis=0).max()
-        if info == 0 and scipy.linalg.lapack.dgecon(lu, norm)[0] > _RCOND:
+        if info == 0 and lapack.dgecon(lu, norm)[0] > _RCOND:
             self.lu, self.pinv = (lu, pivots), None
             return
         # Singular: forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers
@@ -74,41 +92,30 @@ class Kkt:
         self.free = vt[rank:].T
         self.pinv = np.linalg.pinv(scaled, rcond=_NULL, hermitian=True)
 
-    @property
-    def scaled(self) -> np.ndarray:
-        """The matrix with rows and columns scaled alike."""
-        return self.scale[:, None] * self.matrix * self.scale
-
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve, with one step of refinement; a solution of a singular consistent system."""
         x = self._once(right)
-        return x + self._once(right - self.matrix @ x)
+        return x + self._once(right - self.matrix.dot(x))
 
     def _once(self, right: np.ndarray) -> np.ndarray:
-        scaled = (self.scale * right.T).T
+        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        scaled = scale * right
         if self.pinv is not None:
-            y = self.pinv @ scaled
-        else:
-            y = scipy.linalg.lu_solve(self.lu, scaled, check_finite=False)
-        return np.asarray((self.scale * y.T).T)
-
-    def _unpack(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        nu = np.zeros(len(self.on))
-        nu[self.on] = x[: self.size]
-        forces = x[self.size :]
-        torques = (self.stance.gravity - self.stance.jacobian.T @ forces)[self.nb :]
-        return forces, torques, nu
+            return np.asarray(scale * (self.pinv @ scaled))
+        return np.asarray(scale * lapack.dgetrs(*self.lu, scaled)[0])
 
     def derivative(
         self, at: StaticEquilibrium, V: Float[np.ndarray, "nv p"]
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
         """Derivatives of forces and torques along admissible velocities V."""
-        stance, on = self.stance, self.on
-        AV = stance.balance_derivative(at.forces) @ V
-        top = AV[on]
+        stance = self.stance
+        AV = stance.balance_derivative(at.forces).dot(V)
+        right = np.empty((len(self.matrix), V.shape[1]))
+        right[: self.size] = AV[self.on]
         if self.quadratic.inertia:
-            top[self.nb :] -= self.quadratic.compliance_derivative(stance, at.multipliers) @ V
-        right = np.vstack([top, -stance.motion_derivative(at.multipliers) @ V])
+            change = self.quadratic.compliance_derivative(stance, self.problem, at.multipliers)
+            right[self.nb : self.size] -= change @ V
+        right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
         dx = self.solve(right)
         if self.pinv is not None:
             left = np.abs(self.matrix @ dx - right).max()
@@ -120,30 +127,27 @@ class Kkt:
         df = dx[self.size :]
         if self.tie:
             df = df + self.tie.move_derivative(at, V, AV, df)
-        return df, (AV - stance.jacobian.T @ df)[self.nb :]
+        return df, AV[self.nb :] - self.problem.joint_map.dot(df)
 
 
 class TieBreak:
     """A second criterion that decides the forces F z which the first leaves free.
 
-    Its cost over the forces, tau = G_j - J_j' f, has gradient H f - g with
-    H = J_j W J_j' + W_f, g = J_j W G_j + W_f f_ref; the choice is F' (H f - g) = 0.
+    Its cost over the forces has gradient H f - g (`Quadratic.over_forces`); the choice is
+    F' (H f - g) = 0.
     """
 
     def __init__(self, first: Kkt, criterion: Criterion) -> None:
         """Take the cost of the second criterion over the forces left free."""
         assert criterion.tie_break is not None
-        second: Quadratic = criterion.tie_break.at(first.stance)
+        second = criterion.tie_break.at(first.stance)
         if second.inertia:
             raise InvalidInputError(
                 f"criterion {criterion.tie_break.name!r} follows the inertia and cannot be a tie-"
                 "break. Use minimum_wrench, minimum_torque or constant weights."
             )
-        self.first, self.second = first, second
-        self.Jj = first.stance.jacobian[:, first.nb :]
-        self.H = self.Jj @ second.torque @ self.Jj.T + second.wrench
-        self.g = self.Jj @ second.torque @ first.stance.gravity[first.nb :] + second.pull
-        self.F = first.free
+        self.first, self.second, self.F = first, second, first.free
+        self.H, _ = second.over_forces(first.problem)
         self.curvature = self.F.T @ self.H @ self.F
         lowest = float(np.linalg.eigvalsh(self.curvature)[0])
         if lowest <= _NULL * float(np.abs(self.H).max()):
@@ -152,9 +156,10 @@ class TieBreak:
                 "Use minimum_wrench(characteristic_length), which never does."
             )
 
-    def move(self, forces: np.ndarray) -> np.ndarray:
+    def move(self, problem: LoadProblem, forces: np.ndarray) -> np.ndarray:
         """The free forces F z to add."""
-        return self.F @ np.linalg.solve(self.curvature, self.F.T @ (self.g - self.H @ forces))
+        H, g = self.second.over_forces(problem)
+        return self.F @ np.linalg.solve(self.curvature, self.F.T @ (g - H @ forces))
 
     def move_derivative(
         self, at: StaticEquilibrium, V: np.ndarray, AV: np.ndarray, df: np.ndarray
@@ -165,14 +170,13 @@ class TieBreak:
         stays so along V, and F' K = 0 removes the unknown derivative of (w, y).
         """
         first, stance, nb = self.first, self.first.stance, self.first.nb
-        gradient = self.H @ at.forces - self.g
-        x = first.solve(np.concatenate([np.zeros(first.size), -gradient]))
+        H, g = self.second.over_forces(first.problem)
+        W = self.second.torque_weight(first.problem)
+        x = first.solve(np.concatenate([np.zeros(first.size), g - H @ at.forces]))
         w = np.zeros(len(first.on))
         w[first.on] = x[: first.size]
-        w[nb:] -= self.second.torque @ at.torques
-        change = (
-            stance.motion_derivative(w) @ V - self.Jj @ self.second.torque @ AV[nb:] + self.H @ df
-        )
+        w[nb:] -= W @ at.torques
+        change = stance.motion_derivative(w) @ V - first.problem.joint_map.T @ W @ AV[nb:] + H @ df
         return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
 
 

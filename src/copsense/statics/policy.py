@@ -1,4 +1,4 @@
-"""Law: a user's own q -> wrenches, checked and named."""
+"""Policy: a user's own q -> wrenches, validated and named."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from copsense.arrays import finite_array
 from copsense.errors import CopsenseError, InvalidInputError, UndeterminedWrenchError
+from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
 
 BALANCE = 1e-6  # share of the weight by which wrenches may miss the balance
@@ -18,23 +19,23 @@ WrenchPolicy = Callable[[np.ndarray], np.ndarray]
 def wrench_policy(
     torques: Callable[[np.ndarray], np.ndarray], stance: Stance, *, name: str | None = None
 ) -> WrenchPolicy:
-    """The wrenches that a user's static torques cause, as a law ([Romano2016] Eq. (9)).
+    """The wrenches that a user's static torques cause, as a policy ([Romano2016] Eq. (9)).
 
     Args:
         torques: callable q -> joint torques (n,) that hold the robot at rest.
         stance: gives robot and contacts.
-        name: how the law is called in results; default the callable's own name.
+        name: how the policy is called in results; default the callable's own name.
 
     Raises:
         UndeterminedWrenchError: no torque can feel some wrenches (redundant contacts).
     """
 
-    def law(q: np.ndarray) -> np.ndarray:
+    def policy(q: np.ndarray) -> np.ndarray:
         here = stance.at(q)
         if here.rank < len(here.component_index):
             raise UndeterminedWrenchError(
                 "torques do not determine the wrenches here: no torque can feel "
-                f"{', '.join(here.redundant_directions)}. Give a law of wrenches instead.",
+                f"{', '.join(here.redundant_directions)}. Give a policy of wrenches instead.",
                 here.redundant_directions,
             )
         balance = here.gravity.copy()
@@ -44,34 +45,38 @@ def wrench_policy(
         # J' f = G - B tau: consistent where the torques hold the robot, so any inverse serves.
         return here.unstack(np.linalg.lstsq(here.jacobian.T, balance, rcond=None)[0])
 
-    law.__name__ = name or policy_name(torques)
-    return law
+    policy.__name__ = name or policy_name(torques)
+    return policy
 
 
-def policy_name(law: object) -> str:
-    """How a law is called in results: the name of its function, or of its class.
+def policy_name(policy: object) -> str:
+    """How a policy is called in results: the name of its function, or of its class.
 
     Raises:
-        InvalidInputError: it is no law, for it cannot be called.
+        InvalidInputError: it is not a policy, for it cannot be called.
     """
-    if not callable(law):
+    if not callable(policy):
         raise InvalidInputError(
-            f"{law!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, such "
-            "as criterion_named('minimum-torque')."
+            f"{policy!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, "
+            "such as criterion_named('minimum-torque')."
         )
-    return str(getattr(law, "__name__", type(law).__name__))
+    return str(getattr(policy, "__name__", type(policy).__name__))
 
 
-def policy_forces(stance: Stance, law: WrenchPolicy) -> np.ndarray:
-    """Stacked forces (m,) of a law at a stance, refused if they do not balance gravity."""
-    what, nc, m = f"the law {policy_name(law)!r}", len(stance.contacts), len(stance.component_index)
+def policy_forces(stance: Stance, policy: WrenchPolicy) -> np.ndarray:
+    """Stacked forces (m,) of a policy at a stance, rejected if they do not balance gravity."""
+    what, nc, m = (
+        f"the policy {policy_name(policy)!r}",
+        len(stance.contacts),
+        len(stance.component_index),
+    )
     try:
-        returned = law(stance.q)
+        returned = policy(stance.q)
     except CopsenseError:
         raise
     except Exception as error:
         raise InvalidInputError(
-            f"{what} raised {type(error).__name__}: {error}. Mend it at this posture, or keep the "
+            f"{what} raised {type(error).__name__}: {error}. Fix it at this posture, or leave the "
             "posture out."
         ) from error
     stacked = isinstance(returned, np.ndarray) and returned.ndim == 1
@@ -83,16 +88,10 @@ def policy_forces(stance: Stance, law: WrenchPolicy) -> np.ndarray:
     )
     if not stacked:
         wrenches = stance.stack(wrenches)
-    missing = imbalance(stance, wrenches)
+    missing = LoadProblem.of(stance).imbalance(wrenches)
     if missing > BALANCE * stance.robot.weight:
         raise InvalidInputError(
             f"the wrenches of {what} do not balance gravity: {missing:.3g} N or Nm remain on "
             "the base. Give what the ground does to the robot, contact axes, force first."
         )
     return wrenches
-
-
-def imbalance(stance: Stance, forces: np.ndarray) -> float:
-    """Largest force or moment on the base that contact forces leave unbalanced [N, Nm]."""
-    nb = stance.robot.base_nv
-    return float(np.abs(stance.jacobian[:, :nb].T @ forces - stance.gravity[:nb]).max())

@@ -1,286 +1,136 @@
-"""Quadratic program: its exact optimum, from an active set that is checked before it is believed.
+"""Qp: the solver of quadratic and linear programs, its answers validated.
 
-    minimise 1/2 x' H x - g' x   subject to   E' x = e,   A x <= b
-
-A solver finds which rows hold; with these held the optimum solves
-
-    [ 0   E'   0  ] [nu]   [ e ]
-    [ E  -H  -A_h'] [ x] = [-g ]
-    [ 0  -A_h  0  ] [ l]   [-b_h]
-
-whose solution is then held against every optimality condition. If one fails, a second solver of
-another kind names the rows; if that fails too, the caller is told.
+No other module calls daqp. `dual_active_set` is the call, for `program.Program`, which solves
+exactly; `quick_optimum` is for a control loop, where microseconds count and the solver's own
+precision is enough; `linear_minimum` and `least_relaxation` are linear programs.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import daqp
 import numpy as np
-import scipy.linalg
-import scipy.optimize
 from jaxtyping import Float
 
-from copsense.errors import CopsenseError, UnsolvedError
-
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
-_DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
 _ZERO = 1e-12  # norm of a row that limits nothing
-_FAR = 1e4  # units: no x is looked for farther out
 _UNBOUNDED = 1e30  # as the solver writes infinity
+_QUICK = 1e-6  # violation of a condition, relative, that a control loop accepts
+_PROOF = 1e-10  # what a linear program's solution may leave
+_LINEAR_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the slower solver, in the order tried
 
 
-class NoPointError(CopsenseError):
-    """The rows exclude each other; the caller says it in the words of the problem.
+def dual_active_set(
+    H: np.ndarray, h: np.ndarray, A: np.ndarray, b: np.ndarray, **settings: float
+) -> tuple[np.ndarray, int, np.ndarray]:
+    """The only call of the solver: its point, its exit flag (1 and more are good), multipliers."""
+    x, _, flag, info = daqp.solve(
+        np.ascontiguousarray(H),
+        np.ascontiguousarray(h),
+        np.ascontiguousarray(A),
+        np.ascontiguousarray(b),
+        np.full(len(b), -_UNBOUNDED),
+        np.zeros(len(b), dtype=np.int32),
+        **settings,
+    )
+    return np.asarray(x), int(flag), np.asarray(info["lam"])
 
-    Attributes:
-        violation: the least amount by which every row would have to give way, in its own unit.
-        rows: indices of the rows that demand it.
+
+def quick_optimum(
+    H: Float[np.ndarray, "z z"],
+    h: Float[np.ndarray, " z"],
+    A: Float[np.ndarray, "r z"],
+    b: Float[np.ndarray, " r"],
+    unit: float,
+) -> Float[np.ndarray, " z"] | None:
+    """minimise 1/2 y' H y + h' y subject to A y <= b, for a control loop.
+
+    Args:
+        H: positive definite.
+        h: minus the cost's slope at zero.
+        A: rows.
+        b: their bounds.
+        unit: the size of y that errors are relative to.
+
+    Returns:
+        The optimum, or None where there is none or none that meets its conditions was found.
     """
+    size = float(np.abs(H).max())
+    length = np.maximum(np.sqrt((A * A).sum(axis=1)), _ZERO)
+    rows, bound, H, h = A / length[:, None], b / length, H / size, h / size
+    y, flag, l = dual_active_set(H, h, rows, bound, primal_tol=_FEASIBLE * unit)
+    if flag < 1:
+        return None
+    slope = H.dot(y) + h
+    off = np.abs(slope + l.dot(rows)).max() / max(
+        float(np.abs(slope).max()), float(np.abs(h).max())
+    )
+    over = float((rows.dot(y) - bound).max(initial=0.0))
+    if not (off <= _QUICK and over <= _QUICK * unit and l.min(initial=0.0) >= 0.0):
+        return None
+    return y
 
-    def __init__(self, violation: float, rows: np.ndarray) -> None:
-        """Store both."""
-        self.violation, self.rows = violation, rows
-        super().__init__(f"infeasible by {violation:.3g}")
+
+def linear_minimum(
+    cost: Float[np.ndarray, " z"], A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"]
+) -> Float[np.ndarray, " z"] | None:
+    """minimise cost y subject to A y <= b, rows of about unit length; None where none was found."""
+    y = _linear_bydual_active_set(cost, A, b)
+    if y is not None:
+        return y
+    for tolerance in _LINEAR_TOLERANCES:  # some faces are too slight for the finest
+        found = _linear_program(cost, A, b, tolerance)
+        if found.status == 0:
+            return np.asarray(found.x)
+    return None
 
 
-@dataclass(frozen=True, eq=False)
-class Optimum:
-    """The optimum of a program.
+def least_relaxation(
+    A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"], soft: Float[np.ndarray, " r"]
+) -> tuple[float, Float[np.ndarray, " r"]] | None:
+    """minimise s >= 0 subject to A y - s soft <= b: how far rows must be relaxed to leave a point.
 
-    Attributes:
-        x: the optimum (m,).
-        equality: multipliers nu of E' x = e (k,), zero for columns that depend on others.
-        multipliers: l (r,), zero off the held rows.
-        error: largest violation of an optimality condition, relative.
+    Returns:
+        s, and each row's multiplier (r,), zero where it does not press; None if unsolved.
     """
+    v = A.shape[1]
+    rows = np.vstack([np.hstack([A, -soft[:, None]]), -np.eye(v + 1)[-1:]])
+    cost = np.append(np.zeros(v), 1.0)
+    found = _linear_program(cost, rows, np.append(b, 0.0), _LINEAR_TOLERANCES[0])
+    if found.status != 0:
+        return None
+    return float(found.fun), -np.asarray(found.ineqlin.marginals)[:-1]
 
-    x: Float[np.ndarray, " m"]
-    equality: Float[np.ndarray, " k"]
-    multipliers: Float[np.ndarray, " r"]
-    error: float
+
+def _linear_program(
+    cost: Float[np.ndarray, " z"],
+    A: Float[np.ndarray, "r z"],
+    b: Float[np.ndarray, " r"],
+    tolerance: float,
+) -> Any:
+    """SciPy's answer to: minimise cost y subject to A y <= b."""
+    from scipy.optimize import linprog
+
+    options = {
+        "primal_feasibility_tolerance": tolerance,
+        "dual_feasibility_tolerance": tolerance,
+    }
+    return linprog(cost, A, b, bounds=(None, None), method="highs-ds", options=options)
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
-    """A strictly convex quadratic program (on the null space of E').
+def _linear_bydual_active_set(cost: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+    """The minimum of cost y, if the solver's multipliers l prove it: cost + A' l = 0, l >= 0.
 
-    Attributes:
-        H: (m, m), symmetric.
-        g: (m,).
-        E: (m, k).
-        e: (k,).
-        A: (r, m).
-        b: (r,).
-        unit: the size of x that errors are relative to, such as the weight.
-        tolerance: violation of an optimality condition, relative, above which an optimum is
-            not believed.
+    Then cost y >= -l b for every feasible y, which has to be met.
     """
-
-    H: Float[np.ndarray, "m m"]
-    g: Float[np.ndarray, " m"]
-    E: Float[np.ndarray, "m k"]
-    e: Float[np.ndarray, " k"]
-    A: Float[np.ndarray, "r m"]
-    b: Float[np.ndarray, " r"]
-    unit: float
-    tolerance: float = 1e-8
-
-    @cached_property
-    def scale(self) -> Float[np.ndarray, " r"]:
-        """Norm of each row; 1 for a row that is zero, such as the torque of a free arm."""
-        return _lengths(self.A)
-
-    @cached_property
-    def null(self) -> Float[np.ndarray, "m z"]:
-        """Orthonormal basis of what E' x = e leaves free."""
-        return np.asarray(scipy.linalg.null_space(self.E.T))
-
-    @cached_property
-    def start(self) -> Float[np.ndarray, " m"]:
-        """The smallest x with E' x = e."""
-        return np.asarray(np.linalg.lstsq(self.E.T, self.e, rcond=None)[0])
-
-    @cached_property
-    def curvature(self) -> Float[np.ndarray, " z"]:
-        """Eigenvalues of the cost over the null space, rising."""
-        return np.asarray(np.linalg.eigvalsh(self.null.T @ self.H @ self.null))
-
-    def solve(self) -> Optimum:
-        """The optimum.
-
-        Raises:
-            NoPointError: no x respects the rows.
-            UnsolvedError: neither solver found an x that meets the optimality conditions.
-        """
-        errors = []
-        for solver in (self._active_by_daqp, self._active_by_nnls):
-            held = solver()
-            if held is None:
-                continue
-            found = self.optimum(held)
-            if found.error <= self.tolerance:
-                return found
-            errors.append(found.error)
-        violation, rows = self._conflict()
-        if violation > _FEASIBLE * self.unit:
-            raise NoPointError(violation, rows)
-        raise UnsolvedError(min(errors, default=np.inf))
-
-    def optimum(self, held: np.ndarray) -> Optimum:
-        """The optimum with these rows held, those that depend on others left out."""
-        held = held[self._independent(held)]
-        x, nu, pressing = self.hold(held, self.g, self.e, self.b[held])
-        l = np.zeros(len(self.b))
-        l[held] = pressing
-        return Optimum(x, nu, l, self.violation(x, nu, l))
-
-    def violation(self, x: np.ndarray, nu: np.ndarray, l: np.ndarray) -> float:
-        """Largest violation of an optimality condition, in shares of the unit or the gradient."""
-        gradient = self.H @ x - self.g
-        floor = 1e-9 * self.unit * float(np.abs(self.H).max(initial=0.0))
-        size = max(float(np.abs(gradient).max()), floor, 1e-300)
-        slack, pressure = (self.b - self.A @ x) / self.scale, l * self.scale
-        parts = [
-            np.abs(gradient + self.A.T @ l - self.E @ nu).max() / size,
-            np.abs(self.E.T @ x - self.e).max(initial=0.0) / self.unit,
-            np.max(-slack, initial=0.0) / self.unit,
-            np.max(-pressure, initial=0.0) / size,
-            np.max(np.abs(pressure * slack), initial=0.0) / (size * self.unit),
-        ]
-        worst = float(max(parts))
-        return worst if np.isfinite(worst) else np.inf
-
-    def hold(
-        self, held: np.ndarray, g: np.ndarray, e: np.ndarray, b: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, nu and the held rows' l of the system above, for other right-hand sides.
-
-        Args:
-            held: independent rows.
-            g: (m, ...).
-            e: (k, ...).
-            b: of the held rows (a, ...).
-
-        Columns of E that depend on others are left out; their nu is zero.
-        """
-        columns = self._columns
-        k, m, a = len(columns), len(self.g), len(held)
-        K = np.zeros((k + m + a, k + m + a))
-        K[:k, k : k + m] = self.E[:, columns].T
-        K[k : k + m, :k] = self.E[:, columns]
-        K[k : k + m, k : k + m] = -self.H
-        K[k : k + m, k + m :] = -self.A[held].T
-        K[k + m :, k : k + m] = -self.A[held]
-        d = np.ones(len(K))  # rows and columns are scaled alike, so that weights of any unit do
-        for _ in range(3):
-            size = np.abs(d[:, None] * K * d).max(axis=1)
-            d /= np.sqrt(np.where(size > 0, size, 1.0))
-        lu, pivots, _ = scipy.linalg.lapack.dgetrf(d[:, None] * K * d)
-
-        def solve(right: np.ndarray) -> np.ndarray:
-            y, _ = scipy.linalg.lapack.dgetrs(lu, pivots, (d * right.T).T)
-            return np.asarray((d * y.T).T)
-
-        right = np.concatenate([e[columns], -g, -b])
-        y = solve(right)
-        y += solve(right - K @ y)  # one step of refinement
-        nu = np.zeros((len(self.e), *y.shape[1:]))
-        nu[columns] = y[:k]
-        return y[k : k + m], nu, y[k + m :]
-
-    @cached_property
-    def _columns(self) -> np.ndarray:
-        """Columns of E that do not depend on others."""
-        return _independent(self.E)
-
-    def _independent(self, held: np.ndarray) -> np.ndarray:
-        """Which of some rows do not depend on E and the others."""
-        if not len(held):
-            return held
-        return _independent(self.null.T @ (self.A[held] / self.scale[held, None]).T, size=1.0)
-
-    @cached_property
-    def _reduced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """The program over the null space with rows of length one: H, h, A, b."""
-        N, scale = self.null, self.scale
-        return (
-            N.T @ self.H @ N,
-            N.T @ (self.H @ self.start - self.g),
-            np.ascontiguousarray(self.A @ N / scale[:, None]),
-            (self.b - self.A @ self.start) / scale,
-        )
-
-    def _active_by_daqp(self) -> np.ndarray | None:
-        """Rows that hold at the optimum by daqp's dual active-set method; None if it fails."""
-        H, h, A, b = self._reduced
-        if not len(b) or not len(h):
-            return np.zeros(0, dtype=int)
-        size = self.curvature[-1]
-        _, _, flag, info = daqp.solve(
-            np.ascontiguousarray(H / size),
-            np.ascontiguousarray(h / size),
-            A,
-            b,
-            np.full(len(b), -_UNBOUNDED),
-            np.zeros(len(b), dtype=np.int32),
-            primal_tol=_FEASIBLE * self.unit,
-            dual_tol=1e-12,
-        )
-        if flag < 1:
-            return None
-        return np.flatnonzero(np.abs(np.asarray(info["lam"])) > 0)
-
-    def _active_by_nnls(self) -> np.ndarray | None:
-        """The same by non-negative least squares (Lawson and Hanson, least distance programming).
-
-        With H = R' R and y = (R z + R^-T h) / unit the program is: the shortest y with A' y <= b'.
-        Its multipliers are the non-negative combination u of rows nearest to (0, .., 0, 1).
-        """
-        H, h, A, b = self._reduced
-        if not len(b) or not len(h):
-            return None  # nothing that the first solver did not see
-        try:
-            R = np.linalg.cholesky(H).T
-            offset = scipy.linalg.solve_triangular(R, h, trans="T")
-            rows = scipy.linalg.solve_triangular(R, A.T, trans="T").T
-            length = _lengths(rows)
-            bound = (b + rows @ offset) / length
-            bound /= max(float(np.abs(bound).max(initial=0.0)), 1e-300)
-            C = np.vstack([-(rows / length[:, None]).T, -bound])
-            u, _ = scipy.optimize.nnls(C, np.eye(len(C))[-1], maxiter=30 * C.shape[1])
-        except (np.linalg.LinAlgError, RuntimeError, ValueError):
-            return None
-        return np.flatnonzero(u > 0)
-
-    def _conflict(self) -> tuple[float, np.ndarray]:
-        """The least violation of all rows that leaves a point, and the rows that demand it."""
-        N, k = self.null, self.null.shape[1]
-        # Bounded, or what rounding leaves of a zero becomes a way out at 1e9 times the unit.
-        far = _FAR * self.unit
-        found = scipy.optimize.linprog(
-            np.eye(k + 1)[k],
-            A_ub=np.column_stack([self.A @ N, -np.ones(len(self.b))]),
-            b_ub=self.b - self.A @ self.start,
-            bounds=[(-far, far)] * k + [(0, None)],
-        )
-        if found.status != 0:
-            return 0.0, np.zeros(0, dtype=int)
-        return float(found.x[k]), np.flatnonzero(-found.ineqlin.marginals > 1e-9)
-
-
-def _lengths(rows: np.ndarray) -> np.ndarray:
-    lengths = np.linalg.norm(rows, axis=1)
-    return np.where(lengths > _ZERO, lengths, 1.0)
-
-
-def _independent(columns: np.ndarray, size: float | None = None) -> np.ndarray:
-    """Indices of a largest set of independent columns, in rising order."""
-    if not columns.size:
-        return np.zeros(0, dtype=int)
-    R, order = scipy.linalg.qr(columns, mode="r", pivoting=True)
-    pivots = np.abs(np.diag(R))
-    largest = pivots[0] if size is None else size
-    return np.sort(order[: int(np.sum(pivots > _DEPENDENT * largest))])
+    v = A.shape[1]
+    # A linear program as proximal steps, until the steps no longer move.
+    steps = {"eps_prox": 1e-4, "eta_prox": 1e-12, "iter_limit": 1000}
+    y, flag, l = dual_active_set(
+        np.zeros((v, v)), cost, A, b, primal_tol=1e-11, dual_tol=1e-12, **steps
+    )
+    if flag != 1 or not np.all(np.isfinite(y)):
+        return None
+    proofs = (A @ y - b, -l, np.abs(cost + A.T @ l), cost @ y + l @ b)
+    return y if max(float(np.max(p, initial=0.0)) for p in proofs) <= _PROOF else None

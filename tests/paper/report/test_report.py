@@ -7,7 +7,6 @@ import shlex
 from html.parser import HTMLParser
 
 import pytest
-import xarray as xr
 from click.testing import CliRunner
 from support.reproductions import small_reproduction
 
@@ -213,12 +212,8 @@ def test_each_figure_lies_beside_as_png_and_svg(folder, reproduction):
 
 def test_the_data_lie_beside_and_read_back(folder, reproduction):
     data = folder / "data"
-    xr.testing.assert_identical(
-        copsense.load_results(data / "icub_lateral.nc"), reproduction.lateral
-    )
-    xr.testing.assert_identical(
-        copsense.load_results(data / "icub_lateral_at_sole.nc"), reproduction.lateral_at_sole
-    )
+    assert copsense.Sweep.load(data / "icub_lateral.nc") == reproduction.lateral
+    assert copsense.Sweep.load(data / "icub_lateral_at_sole.nc") == reproduction.lateral_at_sole
     claims = json.loads((data / "claims.json").read_text(encoding="utf-8"))
     assert [(c["identifier"], c["verdict"], c["number"]) for c in claims] == [
         (c.claim.identifier, c.verdict.value, c.number) for c in reproduction.claims

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.reproductions import POSTURES, small_reproduction
 
+import copsense
 from copsense.errors import InvalidInputError
 from copsense.paper.claims import LateralSweep, Verdict, evaluate_icub_claims
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, first_crossing
@@ -66,8 +67,8 @@ def test_a_condition_is_named_where_a_claim_holds_only_under_one(reproduction):
 
 def test_the_verdicts_follow_from_the_sweep(reproduction):
     """With the criteria's names exchanged, what the paper says of one is false of the other."""
-    swapped = reproduction.lateral.assign_coords(criterion=[TORQUE, WRENCH, SHORT])
-    found = judged(swapped)
+    swapped = reproduction.lateral.to_xarray().assign_coords(criterion=[TORQUE, WRENCH, SHORT])
+    found = judged(copsense.Sweep(swapped))
     assert found["icub-half-weight"].verdict is NOT
     assert found["icub-forces-vary"].verdict is NOT
     assert found["icub-parallel"].verdict is NOT
@@ -80,7 +81,7 @@ def test_the_verdicts_follow_from_the_sweep(reproduction):
 def test_with_a_short_length_criterion_1_is_criterion_2(reproduction):
     """L = d/2 in the place of L = 1 m: the paper's comparison is one of units."""
     short = reproduction.lateral.sel(criterion=[SHORT, TORQUE, SHORT])
-    found = judged(short.assign_coords(criterion=[WRENCH, TORQUE, SHORT]))
+    found = judged(copsense.Sweep(short.assign_coords(criterion=[WRENCH, TORQUE, SHORT])))
     assert found["icub-half-weight"].verdict is NOT
     assert found["icub-lower-sensitivity"].verdict is NOT
 
@@ -95,12 +96,12 @@ def test_with_a_short_length_criterion_1_is_criterion_2(reproduction):
     ],
 )
 def test_facts_about_the_robot_decide_their_claims(reproduction, name, value, claim, verdict):
-    assert judged(reproduction.lateral.assign_attrs({name: value}))[claim].verdict is verdict
+    assert judged(reproduction.lateral.with_attributes(**{name: value}))[claim].verdict is verdict
 
 
 def test_a_sole_that_is_wide_enough_is_never_left(reproduction):
-    wide = reproduction.lateral.assign(margin=reproduction.lateral["margin"] + 0.1)
-    found = judged(wide)
+    wide = reproduction.lateral.to_xarray().assign(margin=reproduction.lateral["margin"] + 0.1)
+    found = judged(copsense.Sweep(wide))
     assert found["icub-over-the-foot"].verdict is HOLDS
     assert found["icub-full-period"].verdict is NOT  # criterion 1 tracks it too
 
@@ -180,16 +181,19 @@ def test_too_few_postures_are_refused():
 def test_a_sweep_that_lacks_something_is_refused(reproduction):
     lateral, four_bar = reproduction.lateral, FourBar()
     with pytest.raises(InvalidInputError, match="minimum-torque"):
-        LateralSweep.from_dataset(lateral.sel(criterion=[WRENCH]), four_bar)
+        LateralSweep.from_dataset(lateral.subset([WRENCH]), four_bar)
+    lacking = copsense.Sweep(lateral.to_xarray().drop_vars("l_hip_roll_rate"))
     with pytest.raises(InvalidInputError, match="l_hip_roll_rate"):
-        LateralSweep.from_dataset(lateral.drop_vars("l_hip_roll_rate"), four_bar)
+        LateralSweep.from_dataset(lacking, four_bar)
     with pytest.raises(InvalidInputError, match="over both feet"):
-        LateralSweep.from_dataset(lateral.isel(posture=slice(3, None)), four_bar)
-    failed = lateral.copy(deep=True)
+        LateralSweep.from_dataset(
+            lateral.subset(postures=range(3, lateral.sizes["posture"])), four_bar
+        )
+    failed = lateral.to_xarray()
     failed["reason"] = failed["reason"].astype(object)
     failed["reason"].values[0, 0] = "out of reach"
     with pytest.raises(InvalidInputError, match="out of reach"):
-        LateralSweep.from_dataset(failed, four_bar)
+        LateralSweep.from_dataset(copsense.Sweep(failed), four_bar)
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def checked_values(values: object, names: tuple[str, ...]) -> np.ndarray:
     )
 
 
-def joint_units(stance: Stance) -> list[tuple[str, str]]:
+def joint_units(stance: Stance) -> list[tuple[str, Unit]]:
     """Name of each joint velocity and the unit of its position."""
     robot, found = stance.robot, []
     for joint, name in zip(list(robot.model.joints)[2:], robot.joint_names, strict=True):
@@ -168,7 +168,7 @@ def joint_units(stance: Stance) -> list[tuple[str, str]]:
     return found
 
 
-def row_units(stance: Stance, plan: Coordinates) -> list[tuple[str, str]]:
+def row_units(stance: Stance, plan: Coordinates) -> list[tuple[str, Unit]]:
     """What each constraint holds, in the order of a plan's limbs, and its unit."""
     found = []
     for k in (k for limb in plan.limbs for k in limb.contacts):

@@ -27,10 +27,7 @@ from copsense.paper.claims.reference_values import ReferenceValue, compare_with_
 from copsense.paper.claims.sway_runs import (
     Stretch,
     Sway,
-    completed,
     stretch,
-    tip_travel,
-    tracking_error,
 )
 
 __all__ = [
@@ -49,13 +46,10 @@ __all__ = [
     "Verdict",
     "claim",
     "compare_with_reference",
-    "completed",
     "evaluate_claims",
     "evaluate_four_bar_claims",
     "evaluate_icub_claims",
     "evaluate_sway_claims",
     "judge",
     "stretch",
-    "tip_travel",
-    "tracking_error",
 ]

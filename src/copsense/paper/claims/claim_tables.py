@@ -6,8 +6,6 @@ sweep of postures, and what a simulated robot shows on its recordings.
 
 from __future__ import annotations
 
-import xarray as xr
-
 from copsense.paper.claims.claim import Claim, EvaluatedClaim, evaluate_claims
 from copsense.paper.claims.closed_loop_claims import SWAY_CLAIMS
 from copsense.paper.claims.cop_claims import COP_CLAIMS
@@ -19,6 +17,7 @@ from copsense.paper.claims.lemma_claims import LEMMA_CLAIMS
 from copsense.paper.claims.modelling_claims import MODELLING_CLAIMS
 from copsense.paper.claims.sway_runs import Sway
 from copsense.paper.closed_form.dimensions import FourBar
+from copsense.sweeps import Sweep
 
 FOUR_BAR_CLAIMS: tuple[Claim[FourBar], ...] = (
     *MODELLING_CLAIMS,
@@ -46,7 +45,7 @@ def evaluate_four_bar_claims(four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
     return evaluate_claims(FOUR_BAR_CLAIMS, four_bar)
 
 
-def evaluate_icub_claims(dataset: xr.Dataset, four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
+def evaluate_icub_claims(dataset: Sweep, four_bar: FourBar) -> tuple[EvaluatedClaim, ...]:
     """Evaluate the claims of Sections V and VI about the iCub on a lateral sweep.
 
     Args:

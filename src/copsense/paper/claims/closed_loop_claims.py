@@ -9,7 +9,7 @@ import numpy as np
 
 from copsense.paper.claims import icub_cop_claims, icub_force_claims
 from copsense.paper.claims.claim import Claim, Finding, claim, judge
-from copsense.paper.claims.sway_runs import Stretch, Sway, completed, tip_travel, tracking_error
+from copsense.paper.claims.sway_runs import Stretch, Sway
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, RIGHT
 
 _TRACKED = 1e-4  # m rms: "tracks"
@@ -48,16 +48,16 @@ def _forces_vary(sway: Sway) -> Finding:
 @icub_force_claims.full_period.again("loop-full-period")
 def _full_period(sway: Sway) -> Finding:
     """The experiment's outcome."""
-    error = tracking_error(sway.torque)
-    tips = [tip_travel(run) * 1e3 for run in (sway.left, sway.right)]
+    error = sway.torque.tracking_error
+    tips = [run.tip_travel * 1e3 for run in (sway.left, sway.right)]
     ends = [run.attrs["tip_contact"] or "no foot" for run in (sway.left, sway.right)]
-    tracked = completed(sway.torque) and error < _TRACKED
+    tracked = sway.torque.completed and error < _TRACKED
     return Finding(
-        judge(tracked and not any(completed(run) for run in (sway.left, sway.right))),
+        judge(tracked and not any(run.completed for run in (sway.left, sway.right))),
         error,
         "m",
         "rms of criterion 2's CoM y error over a full period "
-        f"({'completed' if completed(sway.torque) else sway.torque.attrs['end_reason']}; tolerance "
+        f"({'completed' if sway.torque.completed else sway.torque.attrs['end_reason']}; tolerance "
         f"{_TRACKED * 1e3:g} mm); under criterion 1 {ends[0]} tips with the CoM at {tips[0]:+.1f} "
         f"mm, and {ends[1]} at {tips[1]:+.1f} mm where it starts to the other side",
     )
@@ -134,7 +134,7 @@ def _quasi_static(sway: Sway) -> Finding:
 def _limits(sway: Sway) -> Finding:
     """Remark 4: what tips without inequalities goes on with them."""
     least = min(float(np.nanmin(run["margin"].values[1:])) for run in sway.limited.values())
-    ends = [completed(run) for run in sway.limited.values()]
+    ends = [run.completed for run in sway.limited.values()]
     return Finding(
         judge(all(ends) and least > 0),
         least,

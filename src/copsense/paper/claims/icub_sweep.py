@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from copsense.errors import InvalidInputError
 from copsense.paper.closed_form.dimensions import FourBar
+from copsense.sweeps import Sweep
 
 WRENCH, TORQUE, SHORT = "minimum-wrench", "minimum-torque", "minimum-wrench, L = d/2"
 HIP_ROLL = "l_hip_roll"
@@ -67,11 +68,11 @@ class LateralSweep:
     four_bar: FourBar
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset, four_bar: FourBar) -> LateralSweep:
+    def from_dataset(cls, lateral: Sweep, four_bar: FourBar) -> LateralSweep:
         """Read what the claims need.
 
         Args:
-            dataset: as `copsense.paper.reproduce.everything` computes it: ``copsense.sweep`` along
+            lateral: as `copsense.paper.reproduce.everything` computes it: ``copsense.sweep`` along
                 ``com_y`` under WRENCH, TORQUE and SHORT, with ``l_hip_roll`` and its rate.
             four_bar: the linkage to compare with.
 
@@ -79,18 +80,19 @@ class LateralSweep:
             InvalidInputError: a criterion or a variable is missing, a row has failed, or the sweep
                 does not reach from over one foot to over the other.
         """
-        missing = {WRENCH, TORQUE, SHORT} - {str(n) for n in dataset["criterion"].values}
-        missing |= {"com_y", HIP_ROLL, f"{HIP_ROLL}_rate"} - {str(n) for n in dataset.variables}
+        missing = {WRENCH, TORQUE, SHORT} - set(lateral.labels("criterion"))
+        missing |= {"com_y", HIP_ROLL, f"{HIP_ROLL}_rate"} - set(lateral)
         if missing:
             raise InvalidInputError(
                 f"the lateral sweep lacks {', '.join(sorted(missing))}. "
                 "Take the one that copsense.paper.reproduce.everything returns."
             )
-        if np.any(dataset["reason"].values != ""):
+        if lateral.failed_rows:
             raise InvalidInputError(
                 "the lateral sweep has failed rows, on which no claim can be judged: "
-                f"{sorted(set(dataset['reason'].values.ravel()) - {''})}."
+                f"{sorted({reason for _, _, reason in lateral.failed_rows})}."
             )
+        dataset = lateral.to_xarray()
         place = dataset["contact_position"].sel(com_axis="y")
         both = dataset.isel(contact=np.argsort(-place.values))  # left first
         half, com_y = float(np.ptp(place.values)) / 2, both["com_y"].values

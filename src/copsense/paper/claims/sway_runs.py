@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.limits import Limits
-
-_SETTLED = 0.1  # s until the ground carries the weight evenly
+from copsense.simulation import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +56,10 @@ class Sway:
     amplitude: float
     limited_amplitude: float
     frequency: float
-    left: xr.Dataset
-    right: xr.Dataset
-    torque: xr.Dataset
-    limited: Mapping[str, xr.Dataset]
+    left: Recording
+    right: Recording
+    torque: Recording
+    limited: Mapping[str, Recording]
     limits: Limits
 
     @cached_property
@@ -75,7 +73,7 @@ class Sway:
         return stretch(self.torque)
 
     @property
-    def runs(self) -> dict[str, xr.Dataset]:
+    def runs(self) -> dict[str, Recording]:
         """Every recording by what it is called."""
         found = {
             "minimum wrench, to the left": self.left,
@@ -85,12 +83,9 @@ class Sway:
         return found | {f"{name} within limits": run for name, run in self.limited.items()}
 
 
-def stretch(recording: xr.Dataset) -> Stretch:
+def stretch(recording: Recording) -> Stretch:
     """What a recording shows while every contact stood."""
-    standing = _standing(recording)
-    # A recording that ends sooner has no settled part: then all but its first instant counts.
-    settled = standing.sel(time=slice(_SETTLED, None))
-    standing = settled if settled.sizes["time"] > 1 else standing.isel(time=slice(1, None))
+    standing = recording.before_first_tip.settled
     order = np.argsort(-recording["contact_position"].sel(com_axis="y").values)  # left first
     y = recording["com"].sel(com_axis="y")
     start = float(y[0])
@@ -104,26 +99,3 @@ def stretch(recording: xr.Dataset) -> Stretch:
         np.stack([np.interp(com_y, travel, foot) for foot in static.T], axis=1),
         standing["margin"].values[:, order],
     )
-
-
-def _standing(recording: xr.Dataset) -> xr.Dataset:
-    """The part until a foot tips."""
-    tip = float(recording.attrs["tip_time"])
-    return recording.sel(time=slice(None, tip if np.isfinite(tip) else None))
-
-
-def tracking_error(recording: xr.Dataset) -> float:
-    """Root mean square of CoM y minus its target until a foot tips, from the very start [m]."""
-    stood = _standing(recording)
-    error = (stood["com"] - stood["com_target"]).sel(com_axis="y")
-    return float(np.sqrt((error**2).mean()))
-
-
-def completed(recording: xr.Dataset) -> bool:
-    """Whether every foot stood to the end."""
-    return recording.attrs["end_kind"] == "completed" and not recording.attrs["tip_kind"]
-
-
-def tip_travel(recording: xr.Dataset) -> float:
-    """CoM y from the start when the first foot ceased to stand [m]; NaN where none did."""
-    return float(recording["tip_com"].sel(com_axis="y") - recording["com"].sel(com_axis="y")[0])

@@ -10,10 +10,7 @@ from copsense.comparison import CAVEAT, agreement, rank_scores, shown_unit
 from copsense.paper.claims import (
     EvaluatedClaim,
     Sway,
-    completed,
     stretch,
-    tip_travel,
-    tracking_error,
 )
 from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.sway_plots import (
@@ -32,7 +29,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
     """Figs. 6 to 9 from closed loop, and the sway within limits."""
     found = {claim.claim.identifier: claim for claim in claims}
     load = sway.torque_stretch.load
-    tips = [abs(tip_travel(run)) * 1e3 for run in (sway.left, sway.right)]
+    tips = [abs(run.tip_travel) * 1e3 for run in (sway.left, sway.right)]
     reach = sway.limited_amplitude * 1e3
     own = found["loop-less-on-support"].number
     off = found["loop-quasi-static"].number * 1e3
@@ -127,13 +124,13 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
                 "name": name,
                 "amplitude": f"{(sway.limited_amplitude if limited else sway.amplitude) * 1e3:g}",
                 "end": f"completes {float(run.attrs['end_time']):.0f} s"
-                if completed(run)
+                if run.completed
                 else f"{run.attrs['tip_contact']} tips at {float(run.attrs['tip_time']):.2f} s"
                 if run.attrs["tip_kind"]
                 else str(run.attrs["end_reason"]),
-                "tip": _mm(tip_travel(run) * 1e3, sign=True),
+                "tip": _mm(run.tip_travel * 1e3, sign=True),
                 "static": "held by the limits" if limited else _mm(static * 1e3, sign=True),
-                "error": f"{tracking_error(run) * 1e3:.4f} mm",
+                "error": f"{run.tracking_error * 1e3:.4f} mm",
                 "margin": f"{float(stood.margin.min()) * 1e3:.2f} mm",
             }
         )

@@ -6,14 +6,13 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from copsense.paper.closed_form import Curve, FigureData
 from copsense.paper.reproduce import UnitOfLength
-from copsense.plots.cops import plot_foot_cop
+from copsense.plots.cop_plots import plot_foot_cop
 from copsense.plots.reading import DEG, MM
 from copsense.plots.style import (
     COM_LINE,
@@ -26,6 +25,7 @@ from copsense.plots.style import (
     put_legend,
     styled,
 )
+from copsense.sweeps import Sweep
 
 _FEET: dict[str, Any] = {"left CoP": "-", "right CoP": (0, (4.5, 1.8))}
 _SCALE = {"m": (MM, "mm"), "m/rad": (MM / DEG, "mm/deg"), "1": (1.0, "")}
@@ -116,7 +116,7 @@ def plot_figure_9a(
 
 @styled
 def plot_figure_9b(
-    dataset: xr.Dataset, wrench: FigureData, torque: FigureData, *, ax: Axes | None = None
+    dataset: Sweep, wrench: FigureData, torque: FigureData, *, ax: Axes | None = None
 ) -> Axes:
     """Draw Fig. 9b: the iCub's left CoP against hip roll, the four-bar's beneath it.
 

@@ -18,7 +18,6 @@ from copsense.paper.report.page import render_page
 from copsense.paper.report.static_figures import report_figures
 from copsense.paper.reproduce import Reproduction
 from copsense.plots import render_figure
-from copsense.storage import write_recording, write_results
 
 PAGE = "report.html"
 _FOLDERS = ("figures", "data")
@@ -102,14 +101,14 @@ def _write_everything(reproduction: Reproduction, folder: Path, command: str) ->
 
 
 def _write_data(reproduction: Reproduction, folder: Path) -> None:
-    write_results(reproduction.lateral, folder / "icub_lateral.nc")
-    write_results(reproduction.lateral, folder / "icub_lateral.csv")
-    write_results(reproduction.lateral_at_sole, folder / "icub_lateral_at_sole.nc")
-    write_results(reproduction.within_limits.lateral, folder / "icub_within_limits.nc")
+    reproduction.lateral.save(folder / "icub_lateral.nc")
+    reproduction.lateral.save(folder / "icub_lateral.csv")
+    reproduction.lateral_at_sole.save(folder / "icub_lateral_at_sole.nc")
+    reproduction.within_limits.lateral.save(folder / "icub_within_limits.nc")
     if reproduction.sway:
         for name, recording in reproduction.sway.runs.items():
             plain = re.sub(r"[^a-z]+", "_", name)
-            write_recording(recording, folder / f"closed_loop_{plain}.nc")
+            recording.save(folder / f"closed_loop_{plain}.nc")
     if reproduction.benchmark is not None:
         reproduction.benchmark.to_csv(folder / "benchmark.csv", index=False)
     _write_json(

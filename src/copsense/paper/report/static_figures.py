@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 
 from copsense.binding import LimitChange
 from copsense.paper.claims.icub_sweep import TORQUE, WRENCH
@@ -28,6 +27,7 @@ from copsense.plots import (
     plot_torques,
 )
 from copsense.plots.style import Figure
+from copsense.sweeps import Sweep
 
 _CEILING = 30.0  # mm/deg: Fig. 5 has a pole
 
@@ -121,8 +121,10 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
     lateral, facts = reproduction.lateral, reproduction.sweep_facts
     both, (three_a, three_b) = paper_criteria(reproduction), reproduction.four_bar_figures[:2]
     y = lateral["com_y"].values
-    wrench, torque = lateral.sel(criterion=[WRENCH]), lateral.sel(criterion=[TORQUE])
-    left, right = (wrench.isel(posture=np.flatnonzero(side * y >= -1e-9)) for side in (1, -1))
+    wrench, torque = lateral.subset([WRENCH]), lateral.subset([TORQUE])
+    left, right = (
+        wrench.subset(postures=np.flatnonzero(side * y >= -1e-9).tolist()) for side in (1, -1)
+    )
     loaded, other = facts.over_foot(facts.series[TORQUE].load)
     own, far = (abs(value) * 1e3 for value in facts.over_foot(facts.series[TORQUE].cop))
     slopes = facts.series[WRENCH].slope
@@ -325,9 +327,9 @@ def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
     return f"{words}: there the slopes may jump, for the other foot carries what one no longer can."
 
 
-def paper_criteria(reproduction: Reproduction) -> xr.Dataset:
+def paper_criteria(reproduction: Reproduction) -> Sweep:
     """The lateral sweep under the paper's two criteria."""
-    return reproduction.lateral.sel(criterion=[WRENCH, TORQUE])
+    return reproduction.lateral.subset([WRENCH, TORQUE])
 
 
 def _figure(ax: object) -> Figure:

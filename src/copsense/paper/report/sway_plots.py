@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -25,6 +24,7 @@ from copsense.plots.style import (
     styled,
 )
 from copsense.polygon import Polygon
+from copsense.simulation import Recording
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _SETTLED = 0.1  # s until the ground carries the weight evenly
@@ -33,7 +33,7 @@ _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 
 
 @styled
-def plot_sway_load(recording: xr.Dataset, *, ax: Axes | None = None) -> Axes:
+def plot_sway_load(recording: Recording, *, ax: Axes | None = None) -> Axes:
     """Draw the measured normal force of each foot against time."""
     ax = axes_or_new(ax)
     share = recording["wrench"].sel(component="fz").values[1:] / recording.attrs["weight"]
@@ -47,7 +47,7 @@ def plot_sway_load(recording: xr.Dataset, *, ax: Axes | None = None) -> Axes:
 
 
 @styled
-def plot_sway_cop(recording: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_sway_cop(recording: Recording, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw the measured CoP y of each foot against time, the soles as bands, the static one under.
 
     The static prediction is the analysis's at the CoM of each instant.
@@ -80,7 +80,7 @@ def plot_sway_cop(recording: xr.Dataset, *, ax: Axes | None = None, legend: bool
 
 @styled
 def plot_sway_hip_roll(
-    recordings: Mapping[str, Sequence[xr.Dataset]],
+    recordings: Mapping[str, Sequence[Recording]],
     *,
     joint: str = "l_hip_roll",
     ax: Axes | None = None,
@@ -118,7 +118,7 @@ def plot_sway_hip_roll(
 
 
 @styled
-def plot_sway_limits(recordings: Mapping[str, xr.Dataset]) -> Figure:
+def plot_sway_limits(recordings: Mapping[str, Recording]) -> Figure:
     """Draw the CoPs of several recordings side by side."""
     figure = new_figure(4.6 * len(recordings), 4.0)
     panels = figure.subplots(1, len(recordings), sharey=True, squeeze=False)[0]
@@ -141,7 +141,7 @@ def _handles(names: Sequence[str]) -> list[Line2D]:
     return [*_feet(names), static, Line2D([], [], label="CoM", **COM_LINE)]
 
 
-def _finish(ax: Axes, recording: xr.Dataset, handles: list[Line2D]) -> None:
+def _finish(ax: Axes, recording: Recording, handles: list[Line2D]) -> None:
     tip = float(recording.attrs["tip_time"])
     if np.isfinite(tip):
         ax.axvline(tip, **_TIP)

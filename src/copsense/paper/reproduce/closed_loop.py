@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import xarray as xr
-
 from copsense.controllers import BalancingController, PathReference, Sine, lateral_reference
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.paper.claims import Sway
-from copsense.simulation import MujocoSimulator, Scenario, rollout
+from copsense.simulation import MujocoSimulator, Recording, Scenario, rollout
 from copsense.simulation.prediction import farther_side, predict, predict_lean
 from copsense.stance import Stance
 
@@ -55,7 +53,7 @@ def sway_in_simulation(
 
     def run(
         name: str, criterion: Criterion, along: PathReference, within: Limits | None = None
-    ) -> xr.Dataset:
+    ) -> Recording:
         done = 0
 
         def advance(steps: int) -> None:
@@ -79,8 +77,10 @@ def sway_in_simulation(
             # The sway may turn before a foot would tip, and looks to one side: the lean goes on.
             side = farther_side(along.signal)
             lean = predict_lean(stance, criterion, side * _FARTHER * amplitude)
-            attached.attrs["static_excursion"] = side * lean.excursion
-            attached.attrs["static_first_order"] = side * lean.first_order
+            return attached.with_attributes(
+                static_excursion=side * lean.excursion,
+                static_first_order=side * lean.first_order,
+            )
         return attached
 
     mirrored = PathReference(reference.path, Sine(-amplitude, frequency))

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.binding import LimitChange
@@ -16,6 +15,7 @@ from copsense.paper.claims import EvaluatedClaim, LateralSweep, ReferenceValue, 
 from copsense.paper.closed_form import FigureData, FourBar
 from copsense.paper.errata import EvaluatedErratum
 from copsense.regions import ComRegion
+from copsense.sweeps import Sweep
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class WithinLimits:
     """
 
     limits: Limits
-    lateral: xr.Dataset
+    lateral: Sweep
     bindings: tuple[LimitChange, ...]
     regions: Mapping[str, ComRegion]
 
@@ -87,8 +87,8 @@ class Reproduction:
 
     four_bar: FourBar
     four_bar_figures: tuple[FigureData, ...]
-    lateral: xr.Dataset
-    lateral_at_sole: xr.Dataset
+    lateral: Sweep
+    lateral_at_sole: Sweep
     unit_of_length: UnitOfLength
     within_limits: WithinLimits
     sway: Sway | None

@@ -7,7 +7,6 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
-import xarray as xr
 
 from copsense._version import __version__
 from copsense.paper.closed_form import FourBar
@@ -15,13 +14,14 @@ from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
 from copsense.posture import PostureCost
 from copsense.robots import PRESETS
 from copsense.stance import Stance
+from copsense.sweeps import Sweep
 
 ROBOT = "icub"
 _MODEL = "iCubGenova04"
 
 
 def describe_parameters(
-    stance: Stance, lowered: Stance, four_bar: FourBar, lateral: xr.Dataset
+    stance: Stance, lowered: Stance, four_bar: FourBar, lateral: Sweep
 ) -> dict[str, str]:
     """What was computed on: name -> sentence."""
     cost, half, postures = PostureCost(), feet_distance(stance) / 2, lateral.sizes["posture"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.paper.claims.icub_sweep import HIP_ROLL, SHORT, TORQUE, WRENCH
@@ -13,7 +12,7 @@ from copsense.paper.reproduce.reproduction import UnitOfLength
 from copsense.path import PosturePath, joint_sweep, lateral_sweep
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
-from copsense.sweeps import sweep
+from copsense.sweeps import Sweep, sweep
 
 PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 _LENGTHS = 25  # values of L in the figure on the unit of length
@@ -26,24 +25,25 @@ def paper_criteria() -> list[Criterion]:
 
 def sweep_sideways(
     stance: Stance, postures: int, clock: Clock, name: str
-) -> tuple[xr.Dataset, PosturePath]:
+) -> tuple[Sweep, PosturePath]:
     """The CoM from over the right foot to over the left, every criterion at every posture."""
     half = feet_distance(stance) / 2
     with clock.stage(f"{name}: postures", postures) as advance:
         path = lateral_sweep(stance, -half, half, postures, progress=advance)
     criteria = [*paper_criteria(), minimum_wrench(half, name=SHORT)]
     with clock.stage(f"{name}: sensitivities", postures) as advance:
-        dataset = sweep(path, criteria, progress=advance)
+        swept = sweep(path, criteria, progress=advance)
     robot = stance.robot
     rolls = [robot.joint_position(s.q, HIP_ROLL) for s in path.stances]
     hip = {"units": "rad", "long_name": "position of the left hip roll joint"}
     rate = {"units": "rad/m", "long_name": "d left hip roll / d com_y along the path"}
     told = (
-        dataset.assign_coords({HIP_ROLL: ("posture", rolls, hip)})
+        swept.to_xarray()
+        .assign_coords({HIP_ROLL: ("posture", rolls, hip)})
         .assign({f"{HIP_ROLL}_rate": ("posture", path.joint_rates(HIP_ROLL), rate)})
         .assign_attrs(_facts(stance, criteria[0]))
     )
-    return told, path
+    return Sweep(told), path
 
 
 def vary_unit_of_length(stance: Stance) -> UnitOfLength:

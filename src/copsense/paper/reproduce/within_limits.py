@@ -10,7 +10,6 @@ from copsense.paper.reproduce.clock import Clock
 from copsense.paper.reproduce.reproduction import WithinLimits
 from copsense.paper.reproduce.sideways import paper_criteria
 from copsense.path import PosturePath
-from copsense.recorded import with_limit_margins
 from copsense.regions import com_region, criterion_region
 from copsense.stance import Stance
 from copsense.sweeps import sweep
@@ -22,7 +21,7 @@ def solve_within_limits(
     """The lateral sweep within limits, where they first bind, and the regions that they leave."""
     criteria = paper_criteria()
     with clock.stage("limits: sensitivities", len(path)) as advance:
-        dataset = with_limit_margins(sweep(path, criteria, limits, progress=advance), limits)
+        dataset = sweep(path, criteria, limits, progress=advance)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
         bindings = []
         for criterion in criteria:

@@ -4,11 +4,12 @@ import csv
 import stat
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
 import copsense
-from copsense import storage
+from copsense.files import load_configurations
 
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 
@@ -20,17 +21,16 @@ def swept(icub):
 
 
 def test_netcdf_gives_everything_back(swept, tmp_path):
-    path = copsense.write_results(swept, tmp_path / "sweep.nc")
-    again = copsense.load_results(path)
-    xr.testing.assert_identical(again, swept)
-    assert copsense.failed_rows(again) == copsense.failed_rows(swept)
-    assert {name: v.dtype.kind for name, v in again.variables.items()} == {
-        name: v.dtype.kind for name, v in swept.variables.items()
-    }
+    path = swept.save(tmp_path / "sweep.nc")
+    again = copsense.Sweep.load(path)
+    xr.testing.assert_identical(again.to_xarray(), swept.to_xarray())
+    assert again == swept
+    assert again.failed_rows == swept.failed_rows
+    assert {n: again[n].dtype.kind for n in again} == {n: swept[n].dtype.kind for n in swept}
 
 
 def test_table_has_a_row_per_posture_criterion_and_contact_with_the_same_numbers(swept, tmp_path):
-    path = copsense.write_results(swept, tmp_path / "sweep.csv")
+    path = swept.save(tmp_path / "sweep.csv")
     with path.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 4 * 2 * 2
@@ -61,9 +61,9 @@ def test_a_file_is_overwritten_only_on_request(swept, tmp_path, suffix):
     path = tmp_path / f"sweep{suffix}"
     path.write_text("mine")
     with pytest.raises(copsense.CopsenseError, match="exists already"):
-        copsense.write_results(swept, path)
+        swept.save(path)
     assert path.read_text() == "mine"
-    copsense.write_results(swept, path, overwrite=True)
+    swept.save(path, overwrite=True)
     assert path.read_bytes() != b"mine"
 
 
@@ -71,17 +71,17 @@ def test_a_file_is_overwritten_only_on_request(swept, tmp_path, suffix):
 def test_a_write_that_breaks_off_leaves_nothing(swept, tmp_path, suffix, monkeypatch):
     break_off_writing(monkeypatch)
     with pytest.raises(copsense.CopsenseError, match="No space left"):
-        copsense.write_results(swept, tmp_path / f"sweep{suffix}")
+        swept.save(tmp_path / f"sweep{suffix}")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", [".nc", ".csv"])
 def test_a_write_that_breaks_off_keeps_the_old_file(swept, tmp_path, suffix, monkeypatch):
-    path = copsense.write_results(swept, tmp_path / f"sweep{suffix}")
+    path = swept.save(tmp_path / f"sweep{suffix}")
     before = path.read_bytes()
     break_off_writing(monkeypatch)
     with pytest.raises(copsense.CopsenseError, match="No space left"):
-        copsense.write_results(swept, path, overwrite=True)
+        swept.save(path, overwrite=True)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 
@@ -89,7 +89,7 @@ def test_a_write_that_breaks_off_keeps_the_old_file(swept, tmp_path, suffix, mon
 def test_an_interruption_leaves_nothing(swept, tmp_path, monkeypatch):
     break_off_writing(monkeypatch, KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        copsense.write_results(swept, tmp_path / "sweep.nc")
+        swept.save(tmp_path / "sweep.nc")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -101,11 +101,11 @@ def break_off_writing(monkeypatch, error=None):
         raise error or OSError(28, "No space left on device")
 
     monkeypatch.setattr(xr.Dataset, "to_netcdf", lambda self, path, **kw: half(path))
-    monkeypatch.setattr(storage.pd.DataFrame, "to_csv", lambda self, path, **kw: half(path))
+    monkeypatch.setattr(pd.DataFrame, "to_csv", lambda self, path, **kw: half(path))
 
 
 def test_a_result_can_be_read_by_whoever_may_read_files(swept, tmp_path):
-    path = copsense.write_results(swept, tmp_path / "sweep.nc")
+    path = swept.save(tmp_path / "sweep.nc")
     plain = tmp_path / "plain"
     plain.touch()
     assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
@@ -117,6 +117,6 @@ def test_configurations_are_read_from_a_table_or_an_array(icub, tmp_path):
     np.save(tmp_path / "q.npy", rows)
     np.savetxt(tmp_path / "q.csv", rows, delimiter=",", fmt="%.17g")
     for name in ("q.npy", "q.csv"):
-        read = storage.load_configurations(tmp_path / name)
+        read = load_configurations(tmp_path / name)
         np.testing.assert_array_equal(read, rows)
         assert len(copsense.path_through(icub, read)) == 3

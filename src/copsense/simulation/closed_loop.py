@@ -1,4 +1,4 @@
-"""rollout: a controller and a simulator go through a scenario; what happened is a dataset."""
+"""rollout: a controller and a simulator go through a scenario, and what happened is recorded."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Literal
 
 import numpy as np
 import pinocchio as pin
-import xarray as xr
 from threadpoolctl import threadpool_limits
 
 from copsense.arrays import finite_number
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, Target, lateral_reference
+from copsense.criterion import Criterion
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
+from copsense.limits import Limits
+from copsense.provenance import made_by
 from copsense.simulation.actuation import Actuation
 from copsense.simulation.events import Event, EventDetector, Thresholds
 from copsense.simulation.odometry import FootOdometry
-from copsense.simulation.recording import Recorder
+from copsense.simulation.recorder import Recorder
+from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.simulation.simulator import (
     AlterableSimulator,
@@ -45,7 +48,7 @@ def rollout(
     thresholds: Thresholds | None = None,
     progress: Callable[[int], object] | None = None,
     stop: Callable[[], bool] | None = None,
-) -> xr.Dataset:
+) -> Recording:
     """Run a scenario in closed loop.
 
     The robot starts at the stance's configuration with the reference's velocity.
@@ -62,10 +65,9 @@ def rollout(
         stop: asked before every control period; true ends the run.
 
     Returns:
-        A dataset over ``time`` with centre of mass, wrenches (measured and commanded), CoPs,
-        margins, torques and joints. Its attributes say why it ended (``end_kind``: ``"completed"``
-        or what went wrong, ``end_reason``, ``end_time``) and which contact tipped first
-        (``tip_*``). What was recorded before an early end is kept.
+        The recording: centre of mass, wrenches (measured and commanded), CoPs, margins, torques and
+        joints over time, why it ended and which contact tipped first. What was recorded before an
+        early end is kept.
 
     Raises:
         CopsenseError: the scenario does not fit the robot or the simulator.
@@ -97,7 +99,7 @@ def _run(
     thresholds: Thresholds,
     progress: Callable[[int], object] | None,
     stop: Callable[[], bool] | None,
-) -> xr.Dataset:
+) -> Recording:
     believed, dt = simulator.stance, simulator.time_step
     name, n = controller_name(controller), len(believed.robot.torque_names)
     scenario.check_stance(believed)
@@ -185,15 +187,18 @@ def _run(
             f"the very first torques of controller {name!r} broke the simulation: {end.message}. "
             "Lower its gains."
         )
-    dataset = recorder.dataset(end, tip, tip_com)
-    dataset.attrs |= {
+    criterion = getattr(controller, "criterion", None)
+    criteria = [criterion] if isinstance(criterion, Criterion) else []
+    within = getattr(controller, "limits", None)
+    attributes = {
         "controller": name,
         "scenario": scenario.name,
         "seed": scenario.seed,
         "control_period": scenario.control_period,
         "time_step": dt,
+        **made_by(stance, criteria, within if isinstance(within, Limits) else None),
     }
-    return dataset
+    return recorder.recording(end, tip, tip_com, attributes)
 
 
 def _alterable(simulator: Simulator, what: str) -> AlterableSimulator:

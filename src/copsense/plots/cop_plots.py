@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
@@ -15,9 +14,7 @@ from copsense.plots.reading import (
     abscissa,
     contact_origins,
     edges,
-    failed,
     labels,
-    planted,
     world_cops,
 )
 from copsense.plots.style import (
@@ -31,11 +28,12 @@ from copsense.plots.style import (
     colours,
     styled,
 )
+from copsense.sweeps import Sweep
 
 
 @styled
 def plot_cop(
-    dataset: xr.Dataset, *, axis: str = "y", ax: Axes | None = None, legend: bool = True
+    dataset: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: bool = True
 ) -> Axes:
     """Draw where each CoP is in the world while the path is followed.
 
@@ -51,7 +49,7 @@ def plot_cop(
     ax = axes_or_new(ax)
     x, index = abscissa(dataset), "xy".index(axis)
     names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
-    colour, cops, good = colours(names), world_cops(dataset)[..., index], planted(dataset)
+    colour, cops, good = colours(names), world_cops(dataset)[..., index], dataset.planted.values
     pulling = dataset["pulling"].values.astype(bool)
     _draw_edges(ax, dataset, axis, contacts)
     com = dataset["com"].sel(com_axis=axis).values * MM
@@ -75,14 +73,14 @@ def plot_cop(
     if legend:
         com_line = Line2D([], [], label="CoM", **COM_LINE)
         off = Line2D([], [], color=MUTED, label="off its sole", **OFF_SOLE)
-        extra = [com_line] if np.all(good | failed(dataset)[..., None]) else [com_line, off]
+        extra = [com_line] if np.all(good | dataset.failed.values[..., None]) else [com_line, off]
         add_legend(ax, colour, extra=extra)
     return ax
 
 
 @styled
 def plot_foot_cop(
-    dataset: xr.Dataset,
+    dataset: Sweep,
     contact: str,
     *,
     axis: str = "y",
@@ -116,7 +114,7 @@ def plot_foot_cop(
     return ax
 
 
-def _draw_edges(ax: Axes, dataset: xr.Dataset, axis: str, contacts: Sequence[str]) -> None:
+def _draw_edges(ax: Axes, dataset: Sweep, axis: str, contacts: Sequence[str]) -> None:
     """Each sole as a band between its edges; a contact without one as its name alone."""
     at: dict[float, list[str]] = {}
     for k, found in enumerate(edges(dataset, axis)):
@@ -142,7 +140,7 @@ def _draw_edges(ax: Axes, dataset: xr.Dataset, axis: str, contacts: Sequence[str
         )
 
 
-def _limit(ax: Axes, dataset: xr.Dataset, axis: str, cops: np.ndarray, com: np.ndarray) -> None:
+def _limit(ax: Axes, dataset: Sweep, axis: str, cops: np.ndarray, com: np.ndarray) -> None:
     """Keep a CoP that diverges from pressing everything else flat."""
     bounds = [e for e in edges(dataset, axis) if e is not None]
     places = contact_origins(dataset)[:, "xy".index(axis)]

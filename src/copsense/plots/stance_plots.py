@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.plots.reading import MM
-from copsense.plots.soles import draw_ground, frame_ground
+from copsense.plots.sole_plots import draw_ground, frame_ground
 from copsense.plots.style import INK, new_figure, styled
 from copsense.sensitivity import CopSensitivity
 from copsense.stance import Stance

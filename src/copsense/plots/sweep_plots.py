@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.plots.cops import plot_cop
-from copsense.plots.curves import plot_load, plot_travel
-from copsense.plots.limits import (
+from copsense.plots.cop_plots import plot_cop
+from copsense.plots.curve_plots import plot_load, plot_travel
+from copsense.plots.limit_plots import (
     first_limits,
     limit_kinds,
     mark_first_limits,
@@ -22,13 +21,11 @@ from copsense.plots.reading import (
     MM,
     abscissa,
     contact_origins,
-    failed,
     labels,
-    planted,
     world_cops,
     world_soles,
 )
-from copsense.plots.soles import draw_ground, draw_track, frame_ground
+from copsense.plots.sole_plots import draw_ground, draw_track, frame_ground
 from copsense.plots.style import (
     COM_LINE,
     LIMIT_LINE,
@@ -39,12 +36,13 @@ from copsense.plots.style import (
     new_figure,
     styled,
 )
+from copsense.sweeps import Sweep
 
 _LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the legend's font
 
 
 @styled
-def plot_results(dataset: xr.Dataset) -> Figure:
+def plot_results(dataset: Sweep) -> Figure:
     """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel.
 
     If it has margins to limits, from `copsense.with_limit_margins`, these are drawn below, and a
@@ -89,7 +87,7 @@ def plot_results(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def widest_axis(dataset: xr.Dataset) -> str:
+def widest_axis(dataset: Sweep) -> str:
     """The world axis along which the CoM moves most."""
     com = dataset["com"].values[:, :2]
     known = com[np.all(np.isfinite(com), axis=1)]
@@ -99,9 +97,9 @@ def widest_axis(dataset: xr.Dataset) -> str:
     return "y" if across >= along else "x"
 
 
-def _draw_above(ax: Axes, dataset: xr.Dataset) -> None:
+def _draw_above(ax: Axes, dataset: Sweep) -> None:
     """Every criterion's tracks in one picture, the later ones thinner so that none hides."""
-    names, cops, good = labels(dataset, "criterion"), world_cops(dataset), planted(dataset)
+    names, cops, good = labels(dataset, "criterion"), world_cops(dataset), dataset.planted.values
     colour, origins = colours(names), contact_origins(dataset)
     pulling = dataset["pulling"].values.astype(bool)
     draw_ground(ax, world_soles(dataset), origins)
@@ -116,7 +114,7 @@ def _draw_above(ax: Axes, dataset: xr.Dataset) -> None:
     frame_ground(ax, world_soles(dataset), origins, np.vstack([com, cops.reshape(-1, 2)]))
 
 
-def _handles(dataset: xr.Dataset) -> list[Line2D]:
+def _handles(dataset: Sweep) -> list[Line2D]:
     names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
     handles = [Line2D([], [], color=c, label=n) for n, c in colours(names).items()]
     handles += [
@@ -126,6 +124,6 @@ def _handles(dataset: xr.Dataset) -> list[Line2D]:
     handles.append(Line2D([], [], label="CoM", **COM_LINE))
     if "limit_margin" in dataset and any(first_limits(dataset, j) for j in range(len(names))):
         handles.append(Line2D([], [], label="first limit met", color=MUTED, **LIMIT_LINE))
-    if not np.all(planted(dataset) | failed(dataset)[..., None]):
+    if not np.all(dataset.planted.values | dataset.failed.values[..., None]):
         handles.append(Line2D([], [], color=MUTED, label="CoP off its sole", **OFF_SOLE))
     return handles

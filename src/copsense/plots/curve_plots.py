@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -19,12 +18,13 @@ from copsense.plots.style import (
     new_figure,
     styled,
 )
+from copsense.sweeps import Sweep
 
 _TALL = 6.0  # how many times the least criterion's travel is shown
 
 
 @styled
-def plot_load(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_load(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw each contact's share of the weight, f_z / (m g)."""
     ax = axes_or_new(ax)
     share = dataset["wrench"].sel(component="fz").values / dataset.attrs["weight"]
@@ -35,7 +35,7 @@ def plot_load(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = Tru
 
 
 @styled
-def plot_margin(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_margin(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw how far inside its sole each CoP is."""
     ax = axes_or_new(ax)
     margin = dataset["margin"].values * MM
@@ -48,7 +48,7 @@ def plot_margin(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = T
 
 
 @styled
-def plot_travel(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_travel(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw how far the CoM may go before the first contact tips or unloads, to first order."""
     ax = axes_or_new(ax)
     x, names = abscissa(dataset), labels(dataset, "criterion")
@@ -71,7 +71,7 @@ def plot_travel(dataset: xr.Dataset, *, ax: Axes | None = None, legend: bool = T
 
 
 @styled
-def plot_sensitivity(dataset: xr.Dataset, *, axis: str = "y") -> Figure:
+def plot_sensitivity(dataset: Sweep, *, axis: str = "y") -> Figure:
     """Draw the sensitivity: the CoP's slope along the path, and its gain per CoM travel."""
     figure = new_figure(9.2, 3.7)
     left, right = figure.subplots(1, 2)
@@ -89,7 +89,7 @@ def plot_sensitivity(dataset: xr.Dataset, *, axis: str = "y") -> Figure:
 
 
 @styled
-def plot_torques(dataset: xr.Dataset) -> Figure:
+def plot_torques(dataset: Sweep) -> Figure:
     """Draw the norm of the torques along the path, and the range of each joint's torque."""
     names, joints = labels(dataset, "criterion"), labels(dataset, "joint")
     figure = new_figure(9.2, max(3.4, 0.24 * len(joints) + 1.0))
@@ -120,7 +120,7 @@ def plot_torques(dataset: xr.Dataset) -> Figure:
 
 def _draw_per_contact(
     ax: Axes,
-    dataset: xr.Dataset,
+    dataset: Sweep,
     values: Float[np.ndarray, "N criterion contact"],
     *,
     legend: bool,

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Bool, Float
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -27,12 +26,13 @@ from copsense.plots.reading import (
     world_soles,
 )
 from copsense.plots.style import INK, MUTED, OFF_SOLE, SOLE, colours, new_figure, styled
+from copsense.sweeps import Sweep
 
 _ROOM = 0.12  # of the feet's extent, around them
 
 
 @styled
-def plot_soles(dataset: xr.Dataset) -> Figure:
+def plot_soles(dataset: Sweep) -> Figure:
     """Draw from above where the CoPs go: a panel per criterion, coloured along the path."""
     names = labels(dataset, "criterion")
     figure = new_figure(4.1 * len(names) + 1.0, 4.6)

@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
-from copsense.plots.cops import plot_cop
+from copsense.plots.cop_plots import plot_cop
 from copsense.plots.marking import marks, shade_below_zero
 from copsense.plots.reading import MM, abscissa, contact_origins, labels, world_soles
-from copsense.plots.soles import draw_ground, frame_ground
+from copsense.plots.sole_plots import draw_ground, frame_ground
 from copsense.plots.style import (
     INK,
     LIMIT_LINE,
@@ -29,6 +28,7 @@ from copsense.plots.style import (
     styled,
 )
 from copsense.regions import ComRegion
+from copsense.sweeps import Sweep
 
 _AT_LIMIT = 1e-9  # m, N or N m: so near to its bound a limit is active
 _KIND_TITLES = {"cop": "CoP to the edge", "torque": "joint torque"}
@@ -36,7 +36,7 @@ _DEGENERATE = 3  # vertices from which a region has an area
 
 
 @styled
-def plot_limited(dataset: xr.Dataset, binding: Mapping[str, Sequence[float]]) -> Figure:
+def plot_limited(dataset: Sweep, binding: Mapping[str, Sequence[float]]) -> Figure:
     """Draw a sweep within limits: each CoP, and its slope with the jumps where a limit binds.
 
     Args:
@@ -72,7 +72,7 @@ def plot_limited(dataset: xr.Dataset, binding: Mapping[str, Sequence[float]]) ->
 @styled
 def plot_regions(
     regions: Mapping[str, ComRegion],
-    dataset: xr.Dataset,
+    dataset: Sweep,
     *,
     com: ArrayLike | None = None,
     ax: Axes | None = None,
@@ -122,7 +122,7 @@ def plot_regions(
 
 @styled
 def plot_limit_margins(
-    dataset: xr.Dataset, *, axes: Sequence[Axes] | None = None, legend: bool = True
+    dataset: Sweep, *, axes: Sequence[Axes] | None = None, legend: bool = True
 ) -> Figure:
     """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
 
@@ -155,12 +155,12 @@ def plot_limit_margins(
     return axes[0].figure  # type: ignore[return-value]
 
 
-def limit_kinds(dataset: xr.Dataset) -> list[str]:
+def limit_kinds(dataset: Sweep) -> list[str]:
     """The kinds of limit whose margins a sweep holds, in their order."""
     return list(dict.fromkeys(str(kind) for kind in dataset["limit_kind"].values))
 
 
-def mark_first_limits(ax: Axes, dataset: xr.Dataset) -> None:
+def mark_first_limits(ax: Axes, dataset: Sweep) -> None:
     """A dotted line where each criterion meets its first limit, to either side of free postures."""
     x, names = abscissa(dataset).values, labels(dataset, "criterion")
     colour = colours(names)
@@ -174,7 +174,7 @@ def mark_first_limits(ax: Axes, dataset: xr.Dataset) -> None:
             )
 
 
-def first_limits(dataset: xr.Dataset, criterion: int) -> list[float]:
+def first_limits(dataset: Sweep, criterion: int) -> list[float]:
     """Where free postures end, as indices between postures.
 
     Interpolated between the last free posture and the first beyond; where the wrenches were held

@@ -1,0 +1,130 @@
+"""Files: outputs that are written whole or not at all, and tables of configurations read in."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from copsense.arrays import finite_array
+from copsense.errors import InvalidInputError, OutputError
+
+
+def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool) -> Path:
+    """A path that can be written, checked before the work starts.
+
+    Args:
+        path: where to write.
+        suffixes: the suffixes that the writer knows; empty for any.
+        overwrite: whether an existing file may be replaced.
+
+    Raises:
+        InvalidInputError: another suffix.
+        OutputError: the file exists and may not be overwritten, or its folder cannot be written.
+    """
+    path = Path(path)
+    if "\0" in str(path):
+        raise OutputError(f"{str(path)!r} is not a path. Leave the null character out.")
+    if suffixes and path.suffix not in suffixes:
+        raise InvalidInputError(
+            f"the output {path.name!r} has no known suffix. Choose {' or '.join(suffixes)}."
+        )
+    if _holds(path.is_dir):
+        raise OutputError(f"{path} is a folder. Give the path of a file.")
+    if _holds(path.exists) and not overwrite:
+        raise OutputError(f"{path} exists already. Give another path, or --force (overwrite=True).")
+    folder = path.parent
+    if not _holds(folder.is_dir):
+        raise OutputError(f"there is no folder {folder} to write {path.name} in. Create it first.")
+    # Permission bits mislead (for root, on /proc, on a full disk): try.
+    _temporary(path).unlink()
+    return path
+
+
+def write_beside(path: Path, write: Callable[[Path], object]) -> None:
+    """Write to a temporary file beside a path, then rename it: the file is whole or not there.
+
+    Args:
+        path: where the file shall be.
+        write: called with the path of the temporary file.
+
+    Raises:
+        OutputError: the file cannot be written; what stood there before is unchanged.
+    """
+    temporary = _temporary(path)
+    try:
+        write(temporary)
+        # mkstemp makes a private file; a result has the usual permissions.
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        temporary.replace(path)
+    except (OSError, RuntimeError) as error:  # the netCDF library raises the latter
+        raise OutputError(
+            f"{path} could not be written: {error}. Free some space, or choose another path."
+        ) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def file_at(path: str | Path) -> bool:
+    """Whether there is a file at a path; false for a name that no file can have."""
+    return _holds(Path(path).is_file)
+
+
+def load_configurations(path: str | Path) -> Float[np.ndarray, "N nq"]:
+    """Configurations from a ``.npy`` array or a ``.csv`` of numbers, one row each.
+
+    Returns:
+        Base position, quaternion (x, y, z, w) and joints, as Pinocchio orders them.
+
+    Raises:
+        InvalidInputError: there is no such file, or it is not a table of numbers.
+    """
+    path = Path(path)
+    need = "Give .npy, or .csv without a heading, with nq numbers a row"
+    if not file_at(path):
+        raise InvalidInputError(f"no file of configurations at {str(path)[:300]!r}. {need}.")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # an empty file is rejected below
+            npy = path.suffix == ".npy"
+            rows = np.load(path) if npy else np.loadtxt(path, delimiter=",", ndmin=2)
+    except (OSError, ValueError, EOFError) as error:
+        raise InvalidInputError(
+            f"{path} is not a table of configurations: {error}. {need}."
+        ) from None
+    if not isinstance(rows, np.ndarray) or not rows.size:
+        raise InvalidInputError(f"{path} holds no table of configurations. {need}.")
+    return finite_array(rows, str(path), (None, None), "nq numbers a row")
+
+
+def _temporary(path: Path) -> Path:
+    """A new empty file beside a path.
+
+    Raises:
+        OutputError: the folder does not take one, or the path's own name is not possible.
+    """
+    try:
+        path.exists()  # raises where the name is too long for the folder
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".copsense-", suffix=path.suffix)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise OutputError(
+            f"{str(path)[:300]!r} cannot be written: {reason}. Choose another path."
+        ) from None
+    os.close(handle)
+    return Path(name)
+
+
+def _holds(test: Callable[[], bool]) -> bool:
+    """The answer of a test of a path; false where the operating system rejects the name."""
+    try:
+        return test()
+    except OSError:
+        return False

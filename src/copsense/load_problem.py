@@ -1,0 +1,54 @@
+"""LoadProblem: which contact forces carry a load, and which torques they take.
+
+The one statement of "share this load": with f the stacked contact forces and tau the torques,
+
+    base_map f = base_wrench        tau = torque_offset - joint_map f
+
+At rest base_map = J_b', joint_map = J_j' and the right-hand sides are gravity's, G_b and G_j; a
+controller states its own (see `controllers.balancing`). What a criterion prefers among such f is
+`Quadratic.over_forces`; what limits allow, `LimitRows.over_forces`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True, eq=False)
+class LoadProblem:
+    """Which contact forces f are allowed, and which torques they take.
+
+    A controller's arrays are good until its next step: copy what is to be kept.
+
+    Attributes:
+        base_map: stacked contact forces to the wrench on the base (nb, m).
+        base_wrench: the wanted wrench of all contacts on the base (nb,), base axes.
+        joint_map: contact forces to joint torques (n, m).
+        torque_offset: (n,) [Nm].
+        joint_inertia: M_j (n, n), for a criterion that weighs with its inverse.
+    """
+
+    base_map: Float[np.ndarray, "nb m"]
+    base_wrench: Float[np.ndarray, " nb"]
+    joint_map: Float[np.ndarray, "n m"]
+    torque_offset: Float[np.ndarray, " n"]
+    joint_inertia: Float[np.ndarray, "n n"]
+
+    @classmethod
+    def of(cls, stance: Stance) -> LoadProblem:
+        """The load of a stance at rest: its weight."""
+        nb, J, G = stance.robot.base_nv, stance.jacobian, stance.gravity
+        return cls(J[:, :nb].T, G[:nb], J[:, nb:].T, G[nb:], stance.mass_matrix[nb:, nb:])
+
+    def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
+        """The torques that contact forces take (n,) [Nm]."""
+        return np.asarray(self.torque_offset - self.joint_map.dot(forces))
+
+    def imbalance(self, forces: Float[np.ndarray, " m"]) -> float:
+        """Largest force or moment on the base by which contact forces miss the load [N, Nm]."""
+        return float(np.abs(self.base_map.dot(forces) - self.base_wrench).max())

@@ -1,0 +1,116 @@
+"""balance: one robot, one controller, one scenario in closed loop, beside the static prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
+
+from copsense.controllers import (
+    STIFF,
+    BalancingController,
+    Controller,
+    Gains,
+    Hold,
+    PathReference,
+    Ramp,
+    Signal,
+    Sine,
+    lateral_reference,
+)
+from copsense.criterion import Criterion, minimum_torque
+from copsense.errors import InvalidInputError
+from copsense.limits import Limits
+from copsense.simulation.closed_loop import rollout
+from copsense.simulation.mujoco_simulator import MujocoSimulator
+from copsense.simulation.prediction import predict
+from copsense.simulation.recording import Recording
+from copsense.simulation.scenario import Scenario
+from copsense.stance import Stance
+
+
+def balance(
+    stance: Stance,
+    criterion: Criterion | None = None,
+    reference: Signal | PathReference | Scenario | None = None,
+    *,
+    limits: Limits | None = None,
+    gains: Gains = STIFF,
+    controller: Controller | None = None,
+    until: Literal["tip", "fall"] = "fall",
+    wrenches: Literal["contacts", "sensors"] = "contacts",
+    progress: Callable[[int], object] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Recording:
+    """Balance a robot in MuJoCo, and record what happened beside the static prediction.
+
+    What ``copsense balance`` runs, in one call.
+
+    Args:
+        stance: the robot on its contacts, where it starts.
+        criterion: how the load is shared, and predicted; default `minimum_torque`. With a
+            `controller` of your own there is a prediction only if you give the criterion.
+        reference: how far to the left the CoM goes: `Hold`, `Sine`, `Ramp` or a `PathReference`,
+            for as long as it naturally lasts, see `natural_duration`; or a whole `Scenario`, with
+            its duration, pushes, noise and the rest. Default: hold still.
+        limits: what the controller's wrenches and torques must respect; None for nothing.
+        gains: of the built-in controller.
+        controller: another controller than `BalancingController`.
+        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` goes on
+            to a fall or the scenario's end.
+        wrenches: measured as the engine's contact forces, or by six-axis sensors over the feet.
+        progress: called with the number of control periods done since the last call.
+        stop: asked before every control period; true ends the run.
+
+    Returns:
+        The recording, with ``static_*`` beside what was measured.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        InvalidInputError: limits for a controller of your own, without a criterion.
+        CopsenseError: the scenario does not fit the robot, or the controller failed at the start.
+    """
+    if controller is not None and criterion is None and limits is not None:
+        raise InvalidInputError(
+            "limits (--limits) are those of the built-in controller and of the static prediction. "
+            "Leave them out, or name the criterion (--criterion) by which your controller is to "
+            "be predicted."
+        )
+    scenario = _scenario(reference)
+    scenario.check_stance(stance)
+    simulator = MujocoSimulator(stance, wrenches=wrenches)
+    scenario.steps_per_control(simulator.time_step)
+    signal = scenario.reference
+    path = signal if isinstance(signal, PathReference) else lateral_reference(stance, signal)
+    predicted = criterion if controller is not None else criterion or minimum_torque()
+    if controller is None:
+        assert predicted is not None
+        controller = BalancingController(stance, predicted, gains, limits=limits)
+    recording = rollout(
+        simulator,
+        controller,
+        replace(scenario, reference=path),
+        until=until,
+        progress=progress,
+        stop=stop,
+    )
+    return recording if predicted is None else predict(path, predicted, limits).attach(recording)
+
+
+def natural_duration(reference: Signal | PathReference) -> float:
+    """How long a reference lasts [s]: one period, a ramp and 1 s, or 2 s for what stands still."""
+    signal = reference.signal if isinstance(reference, PathReference) else reference
+    if isinstance(signal, Sine):
+        return 1.0 / signal.frequency
+    if isinstance(signal, Ramp):
+        return signal.duration + 1.0
+    return 2.0
+
+
+def _scenario(reference: Signal | PathReference | Scenario | None) -> Scenario:
+    if isinstance(reference, Scenario):
+        return reference
+    signal: Signal | PathReference = Hold() if reference is None else reference
+    if not hasattr(signal, "at"):
+        return Scenario(reference=signal)  # its error says what a reference is
+    return Scenario(natural_duration(signal), signal, name=type(signal).__name__.lower())

@@ -1,0 +1,322 @@
+"""Program: a quadratic program's exact optimum, from an active set that is validated first.
+
+    minimise 1/2 x' H x - g' x   subject to   E' x = e,   A x <= b
+
+A solver finds which rows hold; with these held the optimum solves
+
+    [ 0   E'   0  ] [nu]   [ e ]
+    [ E  -H  -A_h'] [ x] = [-g ]
+    [ 0  -A_h  0  ] [ l]   [-b_h]
+
+whose solution is then held against every optimality condition. If one fails, a second solver of
+another kind names the rows; if that fails too, an error says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+
+from copsense.errors import CopsenseError, UnsolvedError
+from copsense.statics import qp
+
+_FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
+_DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
+_WELL = 1e-4  # singular values, relative, from which no column comes near to depending on others
+_ZERO = 1e-12  # norm of a row that limits nothing
+_FAR = 1e4  # units: no x is looked for farther out
+
+
+class NoPointError(CopsenseError):
+    """The rows exclude each other; the caller reports it in the words of the problem.
+
+    Attributes:
+        violation: the least amount by which every row would have to be relaxed, in its own unit.
+        rows: indices of the rows that demand it.
+    """
+
+    def __init__(self, violation: float, rows: np.ndarray) -> None:
+        """Store both."""
+        self.violation, self.rows = violation, rows
+        super().__init__(f"infeasible by {violation:.3g}")
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """The optimum of a program.
+
+    Attributes:
+        x: the optimum (m,).
+        equality: multipliers nu of E' x = e (k,), zero for columns that depend on others.
+        multipliers: l (r,), zero off the held rows.
+        error: largest violation of an optimality condition, relative.
+    """
+
+    x: Float[np.ndarray, " m"]
+    equality: Float[np.ndarray, " k"]
+    multipliers: Float[np.ndarray, " r"]
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """A strictly convex quadratic program (on the null space of E').
+
+    Attributes:
+        H: (m, m), symmetric.
+        g: (m,).
+        E: (m, k).
+        e: (k,).
+        A: (r, m).
+        b: (r,).
+        unit: the size of x that errors are relative to, such as the weight.
+        tolerance: violation of an optimality condition, relative, above which an optimum is
+            rejected.
+    """
+
+    H: Float[np.ndarray, "m m"]
+    g: Float[np.ndarray, " m"]
+    E: Float[np.ndarray, "m k"]
+    e: Float[np.ndarray, " k"]
+    A: Float[np.ndarray, "r m"]
+    b: Float[np.ndarray, " r"]
+    unit: float
+    tolerance: float = 1e-8
+
+    @cached_property
+    def scale(self) -> Float[np.ndarray, " r"]:
+        """Norm of each row; 1 for a row that is zero, such as the torque of a free arm."""
+        return _lengths(self.A)
+
+    @cached_property
+    def null(self) -> Float[np.ndarray, "m z"]:
+        """Orthonormal basis of what E' x = e leaves free."""
+        _, _, rank, v = self._svd
+        return v[rank:].T
+
+    @cached_property
+    def start(self) -> Float[np.ndarray, " m"]:
+        """The smallest x with E' x = e."""
+        u, s, rank, v = self._svd
+        return np.asarray((u[:, :rank].T.dot(self.e) / s[:rank]).dot(v[:rank]))
+
+    @cached_property
+    def _svd(self) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
+        """E' = u s v, and its rank."""
+        u, s, v = np.linalg.svd(self.E.T)
+        rank = int(np.sum(s > s.max(initial=0.0) * max(self.E.shape) * np.finfo(float).eps))
+        return u, s, rank, v
+
+    @cached_property
+    def _reduced_cost(self) -> Float[np.ndarray, "z z"]:
+        return np.asarray(self.null.T.dot(self.H).dot(self.null))
+
+    @cached_property
+    def curvature(self) -> Float[np.ndarray, " z"]:
+        """Eigenvalues of the cost over the null space, rising."""
+        return np.asarray(np.linalg.eigvalsh(self._reduced_cost))
+
+    def solve(self) -> Optimum:
+        """The optimum.
+
+        Raises:
+            NoPointError: no x respects the rows.
+            UnsolvedError: neither solver found an x that meets the optimality conditions.
+        """
+        errors = []
+        for solver in (self._active_by_daqp, self._active_by_nnls):
+            held = solver()
+            if held is None:
+                continue
+            found = self.optimum(held)
+            if found.error <= self.tolerance:
+                return found
+            errors.append(found.error)
+        violation, rows = self._conflict()
+        if violation > _FEASIBLE * self.unit:
+            raise NoPointError(violation, rows)
+        raise UnsolvedError(min(errors, default=np.inf))
+
+    def optimum(self, held: np.ndarray) -> Optimum:
+        """The optimum with these rows held, those that depend on others left out."""
+        held = held[self._independent(held)]
+        x, nu, pressing = self.hold(held, self.g, self.e, self.b[held])
+        l = np.zeros(len(self.b))
+        l[held] = pressing
+        return Optimum(x, nu, l, self.violation(x, nu, l))
+
+    def violation(self, x: np.ndarray, nu: np.ndarray, l: np.ndarray) -> float:
+        """Largest violation of an optimality condition, in shares of the unit or the gradient."""
+        gradient = self.H @ x - self.g
+        floor = 1e-9 * self.unit * float(np.abs(self.H).max(initial=0.0))
+        size = max(float(np.abs(gradient).max()), floor, 1e-300)
+        slack, pressure = (self.b - self.A @ x) / self.scale, l * self.scale
+        parts = [
+            np.abs(gradient + self.A.T @ l - self.E @ nu).max() / size,
+            np.abs(self.E.T @ x - self.e).max(initial=0.0) / self.unit,
+            np.max(-slack, initial=0.0) / self.unit,
+            np.max(-pressure, initial=0.0) / size,
+            np.max(np.abs(pressure * slack), initial=0.0) / (size * self.unit),
+        ]
+        worst = float(max(parts))
+        return worst if np.isfinite(worst) else np.inf
+
+    def hold(
+        self, held: np.ndarray, g: np.ndarray, e: np.ndarray, b: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, nu and the held rows' l of the system above, for other right-hand sides.
+
+        Args:
+            held: independent rows.
+            g: (m, ...).
+            e: (k, ...).
+            b: of the held rows (a, ...).
+
+        Columns of E that depend on others are left out; their nu is zero.
+        """
+        columns = self._columns
+        k, m = len(columns), len(self.g)
+        y = self._system(held)(np.concatenate([e[columns], -g, -b]))
+        nu = np.zeros((len(self.e), *y.shape[1:]))
+        nu[columns] = y[:k]
+        return y[k : k + m], nu, y[k + m :]
+
+    def _system(self, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+        """What solves the system with these rows held, factorised once."""
+        key = held.tobytes()
+        if key not in self._systems:
+            columns = self._columns
+            k, m, a = len(columns), len(self.g), len(held)
+            K = np.zeros((k + m + a, k + m + a))
+            K[k : k + m, :k] = self.E[:, columns]
+            K[:k, k : k + m] = K[k : k + m, :k].T
+            K[k : k + m, k : k + m] = -self.H
+            K[k + m :, k : k + m] = -self.A[held]
+            K[k : k + m, k + m :] = K[k + m :, k : k + m].T
+            self._systems[key] = symmetric_solver(K)
+        return self._systems[key]
+
+    @cached_property
+    def _systems(self) -> dict[bytes, Callable[[np.ndarray], np.ndarray]]:
+        return {}
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        """Columns of E that do not depend on others."""
+        if self._svd[2] == self.E.shape[1] and self._svd[1][-1] > _WELL * self._svd[1][0]:
+            return np.arange(self.E.shape[1])
+        return _independent(self.E)
+
+    def _independent(self, held: np.ndarray) -> np.ndarray:
+        """Which of some rows do not depend on E and the others."""
+        if not len(held):
+            return held
+        if len(held) == 1:  # the solver holds it against what the others leave of it
+            left = np.linalg.norm(self.null.T.dot(self.A[held[0]])) / self.scale[held[0]]
+            return np.zeros(int(left > _DEPENDENT), dtype=int)
+        return _independent(self.null.T @ (self.A[held] / self.scale[held, None]).T, size=1.0)
+
+    @cached_property
+    def _reduced(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The program over the null space with rows of length one: H, h, A, b."""
+        N, scale = self.null, self.scale
+        return (
+            self._reduced_cost,
+            N.T @ (self.H @ self.start - self.g),
+            np.ascontiguousarray(self.A @ N / scale[:, None]),
+            (self.b - self.A @ self.start) / scale,
+        )
+
+    def _active_by_daqp(self) -> np.ndarray | None:
+        """Rows that hold at the optimum by daqp's dual active-set method; None if it fails."""
+        H, h, A, b = self._reduced
+        if not len(b) or not len(h):
+            return np.zeros(0, dtype=int)
+        size = self.curvature[-1]
+        _, flag, l = qp.dual_active_set(
+            H / size, h / size, A, b, primal_tol=_FEASIBLE * self.unit, dual_tol=1e-12
+        )
+        return None if flag < 1 else np.flatnonzero(np.abs(l) > 0)
+
+    def _active_by_nnls(self) -> np.ndarray | None:
+        """The same by non-negative least squares (Lawson and Hanson, least distance programming).
+
+        With H = R' R and y = (R z + R^-T h) / unit the program is: the shortest y with A' y <= b'.
+        Its multipliers are the non-negative combination u of rows nearest to (0, .., 0, 1).
+        """
+        from scipy.optimize import nnls
+
+        H, h, A, b = self._reduced
+        if not len(b) or not len(h):
+            return None  # nothing that the first solver did not see
+        try:
+            R = np.linalg.cholesky(H).T
+            offset = scipy.linalg.solve_triangular(R, h, trans="T")
+            rows = scipy.linalg.solve_triangular(R, A.T, trans="T").T
+            length = _lengths(rows)
+            bound = (b + rows @ offset) / length
+            bound /= max(float(np.abs(bound).max(initial=0.0)), 1e-300)
+            C = np.vstack([-(rows / length[:, None]).T, -bound])
+            u, _ = nnls(C, np.eye(len(C))[-1], maxiter=30 * C.shape[1])
+        except (np.linalg.LinAlgError, RuntimeError, ValueError):
+            return None
+        return np.flatnonzero(u > 0)
+
+    def _conflict(self) -> tuple[float, np.ndarray]:
+        """The least violation of all rows that leaves a point, and the rows that demand it."""
+        from scipy.optimize import linprog
+
+        N, k = self.null, self.null.shape[1]
+        # Bounded, or what rounding leaves of a zero becomes a way out at 1e9 times the unit.
+        far = _FAR * self.unit
+        found = linprog(
+            np.eye(k + 1)[k],
+            A_ub=np.column_stack([self.A @ N, -np.ones(len(self.b))]),
+            b_ub=self.b - self.A @ self.start,
+            bounds=[(-far, far)] * k + [(0, None)],
+        )
+        if found.status != 0:
+            return 0.0, np.zeros(0, dtype=int)
+        return float(found.x[k]), np.flatnonzero(-found.ineqlin.marginals > 1e-9)
+
+
+def symmetric_solver(K: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """What solves K y = right (..., any number of columns), with one step of refinement.
+
+    Rows and columns are scaled alike first, so that weights of any unit may stand in K.
+    """
+    entries, d = np.abs(K), np.ones(len(K))
+    for _ in range(3):
+        size = d * (entries * d).max(axis=1)
+        d /= np.sqrt(np.where(size > 0, size, 1.0))
+    lu, pivots, _ = scipy.linalg.lapack.dgetrf(d[:, None] * K * d)
+
+    def once(right: np.ndarray) -> np.ndarray:
+        scale = d if right.ndim == 1 else d[:, None]
+        return np.asarray(scale * scipy.linalg.lapack.dgetrs(lu, pivots, scale * right)[0])
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        y = once(right)
+        return y + once(right - K.dot(y))
+
+    return solve
+
+
+def _lengths(rows: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(rows, axis=1)
+    return np.where(lengths > _ZERO, lengths, 1.0)
+
+
+def _independent(columns: np.ndarray, size: float | None = None) -> np.ndarray:
+    """Indices of a largest set of independent columns, in rising order."""
+    if not columns.size:
+        return np.zeros(0, dtype=int)
+    R, order = scipy.linalg.qr(columns, mode="r", pivoting=True)
+    pivots = np.abs(np.diag(R))
+    largest = pivots[0] if size is None else size
+    return np.sort(order[: int(np.sum(pivots > _DEPENDENT * largest))])
