@@ -39,7 +39,7 @@ def on_slopes(name, tilt, step, contacts=slice(None)):
         point = (float(x), float(y), float(rng.uniform(0, step)))
         plane = copsense.Plane(point, (*rng.uniform(-tilt, tilt, 2), 1.0))
         placed.append(replace(contact, plane=plane))
-    return copsense.stand(stance.robot, placed[contacts], stance.q)
+    return copsense.robots.stand(stance.robot, placed[contacts], stance.q)
 
 
 def with_hands(name, *hands):

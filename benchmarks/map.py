@@ -28,8 +28,8 @@ def measure(count, threads, folder):
     import copsense
 
     stance = copsense.load_stance("icub")
-    sample = copsense.Sample(
-        tuple(copsense.Axis(name, *ends) for name, ends in RANGES.items()), count
+    sample = copsense.maps.Sample(
+        tuple(copsense.maps.Axis(name, *ends) for name, ends in RANGES.items()), count
     )
     criteria = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
     path = Path(folder) / f"{count}.zarr"

@@ -49,7 +49,7 @@ from copsense.simulation.prediction import predict
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "peers"
 C1, C2 = copsense.minimum_wrench(1.0), copsense.minimum_torque()
-LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
+LIMITS = Limits(normal_force=10.0, friction=1.0, cop_margin=1e-3, torsion=None)
 KNEES = {"straight": 0.0, "knees 0.6 rad": 0.6, "knees 1.0 rad": 1.0}
 LEAN = Ramp(0.055)
 SWAY, FAR = Sine(0.039, 0.05), Sine(0.07, 0.05)  # of the paper's Section V, and over either foot

@@ -19,7 +19,7 @@ planes = {
 }
 contacts = [copsense.Contact(foot, kind="point", plane=plane) for foot, plane in planes.items()]
 home = copsense.load_stance("solo12")
-stance = copsense.stand(model, contacts, home.q)
+stance = copsense.robots.stand(model, contacts, home.q)
 print(f"{stance.admissible_motions.shape[1]} admissible motions")
 
 # %%
@@ -37,6 +37,6 @@ for criterion in (copsense.minimum_wrench(0.2), copsense.minimum_torque()):
 
 equilibrium = copsense.solve_equilibrium(stance, copsense.minimum_torque())
 plane = copsense.Plane((0.0, 0.0, 0.01), (0.1, 0.0, 1.0))
-total = copsense.total_center_of_pressure(equilibrium, plane)
-assert np.allclose(total, copsense.com_projection(stance, plane), atol=1e-10)
+total = copsense.cop.total_center_of_pressure(equilibrium, plane)
+assert np.allclose(total, copsense.cop.com_projection(stance, plane), atol=1e-10)
 print("centre of pressure on the plane [m]:", total.round(4))

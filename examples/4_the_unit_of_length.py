@@ -13,10 +13,12 @@ import copsense
 from copsense.paper import FourBar, solve_four_bar
 
 linkage = FourBar(leg_length=0.5, rod_length=0.14)
-robot = copsense.four_bar_robot(0.5, 0.14, linkage.leg_mass, linkage.body_mass)
+robot = copsense.robots.four_bar_robot(0.5, 0.14, linkage.leg_mass, linkage.body_mass)
 feet = [copsense.Contact(foot, kind="planar") for foot in ("l_sole", "r_sole")]
 xi = 1.5  # angle between rod and leg [rad]
-stance = copsense.Stance(robot, robot.configuration(copsense.four_bar_angles(xi)), tuple(feet))
+stance = copsense.Stance(
+    robot, robot.configuration(copsense.robots.four_bar_angles(xi)), tuple(feet)
+)
 
 # %%
 # The paper's x axis points to the robot's right, so left and right keep their names and the

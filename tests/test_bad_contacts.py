@@ -99,7 +99,7 @@ def test_a_contact_at_a_frame_off_the_sole_warns_in_millimetres():
         copsense.load_stance(urdf(), contacts=FEET)
     with pytest.warns(copsense.robots.ContactGeometryWarning):
         stance = copsense.load_stance(urdf(), contacts=FEET)
-    assert "10.0 mm" in copsense.sole_notes(stance)[0]
+    assert "10.0 mm" in copsense.robots.sole_notes(stance)[0]
 
 
 def test_a_robot_that_is_no_preset_asks_for_its_contacts():

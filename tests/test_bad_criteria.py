@@ -21,7 +21,7 @@ def test_the_characteristic_length_is_a_positive_number_that_means_something(len
     for build in (
         copsense.minimum_wrench,
         lambda value: copsense.reference_wrench(np.zeros((2, 6)), value),
-        lambda value: copsense.criterion_named("minimum-wrench", value),
+        lambda value: copsense.criterion.criterion_named("minimum-wrench", value),
     ):
         with pytest.raises(InvalidInputError, match="characteristic length L"):
             build(length)
@@ -29,7 +29,7 @@ def test_the_characteristic_length_is_a_positive_number_that_means_something(len
 
 def test_an_unknown_criterion_lists_the_known_ones():
     with pytest.raises(UnknownNameError, match=r"Did you mean minimum-torque.*minimum-tangential"):
-        copsense.criterion_named("minimum-torqe")
+        copsense.criterion.criterion_named("minimum-torqe")
 
 
 @pytest.mark.parametrize("scale", [0.0, -1.0, np.nan, np.inf])
@@ -241,13 +241,13 @@ def test_a_law_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path
 
 @pytest.mark.parametrize("count", [1, 3, 24])
 def test_torques_of_the_wrong_number_say_how_many_joints_there_are(icub, count):
-    law = copsense.wrench_policy(lambda q: np.zeros(count), icub)
+    law = copsense.statics.wrench_policy(lambda q: np.zeros(count), icub)
     with pytest.raises(InvalidInputError, match=r"the torques returned .*\(23,\)"):
         copsense.solve_equilibrium(icub, law)
 
 
 def test_torques_do_not_determine_redundant_contacts(one_foot_twice):
-    law = copsense.wrench_policy(lambda q: np.zeros(23), one_foot_twice)
+    law = copsense.statics.wrench_policy(lambda q: np.zeros(23), one_foot_twice)
     with pytest.raises(UndeterminedWrenchError, match="no torque can feel"):
         copsense.solve_equilibrium(one_foot_twice, law)
 

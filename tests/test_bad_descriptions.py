@@ -170,7 +170,7 @@ def test_a_foot_without_a_sole_says_what_to_give_instead(foot, said):
 def test_a_robot_without_geometry_says_so():
     robot = Robot.from_model(pin.buildSampleModelHumanoidRandom())
     with pytest.raises(InvalidInputError, match="without geometry"):
-        copsense.read_sole(robot, copsense.Contact(robot.frame_names[-1]))
+        copsense.sole.read_sole(robot, copsense.Contact(robot.frame_names[-1]))
 
 
 def test_an_unknown_robot_lists_the_known_ones_and_the_nearest():
@@ -229,7 +229,7 @@ def test_a_robot_whose_package_is_absent_names_the_extra(robot, package, extra, 
 
 def test_a_planar_base_takes_no_orientation():
     with pytest.raises(InvalidInputError, match="no heading"):
-        copsense.four_bar_robot().configuration(base_yaw=0.3)
+        copsense.robots.four_bar_robot().configuration(base_yaw=0.3)
     with pytest.raises(InvalidInputError, match=r"no orientation.*Leave"):
         copsense.load_stance("four_bar", base_rpy=(0.0, 0.0, 0.1))
 
@@ -238,4 +238,4 @@ def test_a_planar_base_takes_no_orientation():
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
 def test_a_four_bar_refuses_senseless_sizes(name, value):
     with pytest.raises(InvalidInputError, match=name.split("_")[0]):
-        copsense.four_bar_robot(**{name: value})
+        copsense.robots.four_bar_robot(**{name: value})

@@ -102,16 +102,16 @@ def test_targets_are_finite_and_one_for_each_contact(icub):
 @pytest.mark.parametrize("weight", [0.0, -1.0, np.nan])
 def test_posture_weights_are_positive(weight):
     with pytest.raises(InvalidInputError, match="the posture weight free"):
-        copsense.PostureCost(free=weight)
+        copsense.posture.PostureCost(free=weight)
 
 
 def test_a_displacement_off_the_manifold_s_reach_is_an_error_not_a_guess(icub):
     with pytest.raises(UnreachablePostureError, match="remains"):
-        copsense.retract(icub, 10 * np.ones(29))
+        copsense.posture.retract(icub, 10 * np.ones(29))
     with pytest.raises(InvalidInputError, match="the displacement is not finite"):
-        copsense.retract(icub, np.full(29, np.nan))
+        copsense.posture.retract(icub, np.full(29, np.nan))
     with pytest.raises(InvalidInputError, match="the displacement has shape"):
-        copsense.retract(icub, np.ones(3))
+        copsense.posture.retract(icub, np.ones(3))
 
 
 @pytest.mark.parametrize(

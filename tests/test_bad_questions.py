@@ -35,7 +35,7 @@ def test_an_unloaded_contact_has_no_centre_of_pressure(icub):
     equilibrium = copsense.solve_equilibrium(icub, law)
     assert equilibrium.unloaded == ("r_sole",)
     for ask in (
-        lambda: copsense.contact_cops(equilibrium),
+        lambda: copsense.cop.contact_cops(equilibrium),
         lambda: copsense.cop_sensitivity(icub, law),
     ):
         with pytest.raises(UnloadedContactError, match=r"on r_sole.*remove the contact") as caught:
@@ -45,35 +45,35 @@ def test_an_unloaded_contact_has_no_centre_of_pressure(icub):
 
 def test_a_force_along_the_plane_has_no_centre_of_pressure():
     with pytest.raises(UnloadedContactError, match="the plane"):
-        copsense.center_of_pressure(np.array([1.0, 0.0, 0.0]), np.zeros(3))
+        copsense.cop.center_of_pressure(np.array([1.0, 0.0, 0.0]), np.zeros(3))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_what_is_not_finite_has_no_centre_of_pressure(icub, value):
     still, moving = np.zeros(29), np.full(29, value)
     with pytest.raises(InvalidInputError, match="the force is not finite"):
-        copsense.center_of_pressure(np.array([0.0, 0.0, value]), np.zeros(3))
+        copsense.cop.center_of_pressure(np.array([0.0, 0.0, value]), np.zeros(3))
     with pytest.raises(InvalidInputError, match="the acceleration is not finite"):
-        copsense.zero_moment_point(icub, still, moving)
+        copsense.cop.zero_moment_point(icub, still, moving)
     with pytest.raises(InvalidInputError, match="other_wrenches is not finite"):
-        copsense.foot_rotation_indicator(
+        copsense.cop.foot_rotation_indicator(
             icub, "l_sole", still, still, other_wrenches=np.full((2, 6), value)
         )
 
 
 def test_a_velocity_has_the_robot_s_size(icub):
     with pytest.raises(InvalidInputError, match=r"the velocity has shape \(3,\).*\(29,\)"):
-        copsense.zero_moment_point(icub, np.zeros(3), np.zeros(29))
+        copsense.cop.zero_moment_point(icub, np.zeros(3), np.zeros(29))
 
 
 def test_an_unknown_contact_lists_the_contacts(icub):
     with pytest.raises(UnknownNameError, match=r"'l_soul'.*Did you mean l_sole"):
-        copsense.foot_rotation_indicator(icub, "l_soul", np.zeros(29), np.zeros(29))
+        copsense.cop.foot_rotation_indicator(icub, "l_soul", np.zeros(29), np.zeros(29))
 
 
 def test_a_com_has_no_projection_on_a_wall(icub):
     with pytest.raises(InvalidInputError, match="parallel to gravity"):
-        copsense.com_projection(icub, copsense.Plane(normal=(1, 0, 0)))
+        copsense.cop.com_projection(icub, copsense.Plane(normal=(1, 0, 0)))
 
 
 def test_a_tangent_that_moves_a_contact_is_refused_with_its_projection(icub, sensitivity):
@@ -112,7 +112,7 @@ def test_a_joint_that_stands_still_has_no_sensitivity(icub, sensitivity):
 @pytest.mark.parametrize("step", [0.0, -1e-3, np.nan])
 def test_the_step_of_differences_is_positive(icub, step):
     for ask in (
-        copsense.finite_difference_sensitivity,
+        copsense.sensitivity.finite_difference_sensitivity,
         copsense.check_sensitivity,
     ):
         with pytest.raises(InvalidInputError, match="the step of the differences"):
@@ -132,24 +132,24 @@ def test_an_audit_says_where_and_by_how_much_it_failed(icub):
 def test_a_margin_is_of_a_point_and_a_polygon_in_order(icub):
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     middle = np.array([0.5, 0.5])
-    assert copsense.Polygon(square).margin(middle).distance == pytest.approx(0.5)
+    assert copsense.polygon.Polygon(square).margin(middle).distance == pytest.approx(0.5)
     star = np.array([[np.cos(2 * t), np.sin(2 * t)] for t in np.arange(5) * 2 * np.pi / 5])
     dented = np.insert(square, 1, [0.5, 0.1], axis=0)
     for wrong in (square[::-1], np.vstack([square, square[-1:]]), star, dented):
         with pytest.raises(InvalidInputError, match="counter-clockwise"):
-            copsense.Polygon(wrong)
+            copsense.polygon.Polygon(wrong)
     with pytest.raises(InvalidInputError, match="no edge"):
-        copsense.Polygon(square[:1]).margin(middle)
+        copsense.polygon.Polygon(square[:1]).margin(middle)
     with pytest.raises(InvalidInputError, match="the point is not finite"):
-        copsense.Polygon(square).margin(np.array([np.nan, 0.5]))
+        copsense.polygon.Polygon(square).margin(np.array([np.nan, 0.5]))
 
 
 @pytest.mark.parametrize("thickness", [0.0, -1e-3, np.nan])
 def test_the_thickness_of_a_sole_is_positive(icub, thickness):
     with pytest.raises(InvalidInputError, match="the thickness of a sole"):
-        copsense.read_sole(icub.robot, icub.contacts[0], thickness=thickness)
+        copsense.sole.read_sole(icub.robot, icub.contacts[0], thickness=thickness)
     with pytest.raises(UnknownNameError, match="Did you mean l_sole"):
-        copsense.read_sole(icub.robot, copsense.Contact("l_soul"))
+        copsense.sole.read_sole(icub.robot, copsense.Contact("l_soul"))
 
 
 def test_a_robot_that_cannot_move_has_zero_gain_and_never_tips():

@@ -22,7 +22,7 @@ def test_cop_is_on_the_plane_and_has_no_tipping_moment():
     rng = np.random.default_rng(1)
     for plane in random_planes(2):
         f, m = rng.standard_normal((2, 3))
-        p = copsense.center_of_pressure(f, m, plane)
+        p = copsense.cop.center_of_pressure(f, m, plane)
         n = np.array(plane.normal)
         assert n @ (p - plane.point) == pytest.approx(0, abs=1e-12 * np.abs(p).max())
         left = m - np.cross(p, f)  # about p: along the normal alone
@@ -33,7 +33,7 @@ def test_cop_is_on_the_plane_and_has_no_tipping_moment():
 def test_total_cop_is_under_the_com_on_level_ground(lateral_path, name):
     for stance in lateral_path.stances[::4]:
         found = copsense.solve_equilibrium(stance, criteria(stance)[name])
-        total = copsense.total_center_of_pressure(found)
+        total = copsense.cop.total_center_of_pressure(found)
         np.testing.assert_allclose(total, [*stance.com[:2], 0.0], rtol=0, atol=1e-12)
 
 
@@ -45,17 +45,17 @@ def test_total_cop_is_where_the_vertical_through_the_com_meets_a_plane(icub):
         n = np.array(plane.normal)
         x, y, _ = stance.com
         z = plane.point[2] - (n[0] * (x - plane.point[0]) + n[1] * (y - plane.point[1])) / n[2]
-        total = copsense.total_center_of_pressure(found, plane)
+        total = copsense.cop.total_center_of_pressure(found, plane)
         np.testing.assert_allclose(total, [x, y, z], rtol=0, atol=1e-11)
         np.testing.assert_allclose(
-            copsense.com_projection(stance, plane), [x, y, z], rtol=0, atol=1e-12
+            copsense.cop.com_projection(stance, plane), [x, y, z], rtol=0, atol=1e-12
         )
 
 
 def test_contact_cop_is_where_its_wrench_tips_nothing_in_the_world(icub):
     stance = off_centre(on_tilted_planes(icub, tilt=0.15, step=0.03))
     found = copsense.solve_equilibrium(stance, copsense.minimum_torque())
-    cops = copsense.contact_cops(found)
+    cops = copsense.cop.contact_cops(found)
     for place, wrench, cop in zip(stance.placements, found.world_wrenches, cops, strict=True):
         arm = place.rotation @ np.append(cop, 0.0)
         left = place.rotation.T @ (wrench[3:] - np.cross(arm, wrench[:3]))
@@ -64,7 +64,7 @@ def test_contact_cop_is_where_its_wrench_tips_nothing_in_the_world(icub):
         plane = Plane(tuple(place.translation), tuple(place.rotation[:, 2]))
         moment = wrench[3:] + np.cross(place.translation, wrench[:3])
         np.testing.assert_allclose(
-            copsense.center_of_pressure(wrench[:3], moment, plane),
+            copsense.cop.center_of_pressure(wrench[:3], moment, plane),
             place.translation + arm,
             rtol=0,
             atol=1e-12,
@@ -75,20 +75,20 @@ def test_cop_of_several_forces_is_their_mean_by_load():
     rng = np.random.default_rng(5)
     where = np.column_stack([rng.uniform(-1, 1, (6, 2)), np.zeros(6)])
     forces = np.column_stack([rng.standard_normal((6, 2)), rng.uniform(1, 5, 6)])
-    p = copsense.center_of_pressure(forces.sum(0), np.cross(where, forces).sum(0))
+    p = copsense.cop.center_of_pressure(forces.sum(0), np.cross(where, forces).sum(0))
     np.testing.assert_allclose(p, forces[:, 2] @ where / forces[:, 2].sum(), rtol=0, atol=1e-14)
 
 
 def test_a_contact_without_load_has_no_cop(lateral_path):
     stance = lateral_path.stances[0]
     with pytest.raises(copsense.CopsenseError, match="plane"):
-        copsense.center_of_pressure([1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
+        copsense.cop.center_of_pressure([1.0, 0.0, 0.0], [0.0, 0.0, 0.0])
     found = copsense.solve_equilibrium(stance, copsense.minimum_torque())
     forces = found.forces.copy()
     forces[2] = 0.0
-    bare = copsense.StaticEquilibrium(
+    bare = copsense.statics.StaticEquilibrium(
         stance, found.criterion, forces, found.torques, found.multipliers
     )
     assert bare.unloaded == ("l_sole",)
     with pytest.raises(copsense.CopsenseError, match="l_sole"):
-        copsense.contact_cops(bare)
+        copsense.cop.contact_cops(bare)

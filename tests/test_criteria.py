@@ -134,8 +134,8 @@ def test_criteria_by_name_are_the_functions(limited):
         "inertia-weighted-torque": copsense.weighted_torque("inverse inertia"),
         "minimum-tangential": copsense.minimum_tangential(copsense.minimum_wrench(0.4)),
     }
-    assert set(same) == set(copsense.CRITERIA)
+    assert set(same) == set(copsense.criterion.CRITERIA)
     for name, criterion in same.items():
-        named = copsense.criterion_named(name, 0.4)
+        named = copsense.criterion.criterion_named(name, 0.4)
         assert named.name == name
         assert same_wrenches(limited, named, criterion)

@@ -10,7 +10,7 @@ import copsense
 from copsense.design import Family, design_criterion, families, joint_groups, score
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import NO_LIMITS, Limits
-from copsense.margins import limit_travel
+from copsense.scan import limit_travel
 
 D, HALF = 0.14, 0.03
 WITHIN = 3 * 0.0693 / 11  # m: three postures to either side, the last ones included
@@ -245,3 +245,25 @@ def test_a_coarse_path_has_the_exact_travel(icub, count):
         )
         found = score(path, COP_ONLY, criterion, {})
         assert found.travel == pytest.approx(exact, abs=1e-6)
+
+
+README = Limits(friction=0.33, torque="model")
+
+
+@pytest.mark.parametrize("grid", [3, 7])
+def test_a_search_that_begins_on_a_bound_leaves_it(icub, grid):
+    # The best of the grid has the least length; the simplex that was clipped to it found 65.3 mm.
+    path = copsense.lateral_sweep(icub, -0.09, 0.09, 19)
+    design = design_criterion(path, README, families(icub)["mix"], grid=grid)
+    assert design.score.travel == pytest.approx(0.0672, abs=1e-4)
+    assert design.score.parameters["characteristic_length"] == pytest.approx(0.0161, abs=5e-4)
+    assert design.score.parameters["wrench_share"] == 1.0
+    assert design.at_bound == ("wrench_share",)
+    # One parameter alone goes farther, which is worth knowing.
+    (length,) = design.alternatives
+    assert length.travel == pytest.approx(0.0689, abs=1e-4)
+    assert length.parameters == {"characteristic_length": 0.01}
+    alone = design_criterion(path, README, families(icub)["length"], grid=grid)
+    assert alone.at_bound == ("characteristic_length",)
+    assert alone.alternatives == ()
+    assert alone.score == length

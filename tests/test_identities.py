@@ -98,7 +98,7 @@ def test_com_gain_is_the_rate_of_the_cops_along_the_motion_of_least_energy(postu
 
     def cops(stance):
         equilibrium = copsense.solve_equilibrium(stance, copsense.minimum_torque())
-        return copsense.contact_cops(equilibrium)
+        return copsense.cop.contact_cops(equilibrium)
 
     assert largest_error(found.com_gain, along(posture, cops, motions)) < 1e-7
     # Any other motion with the same CoM has more kinetic energy.

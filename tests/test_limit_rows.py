@@ -105,7 +105,7 @@ def test_cop_rows_are_the_sole_less_its_margin(shod):
         for p in rng.uniform(-0.15, 0.15, (500, 2)):
             fz = rng.uniform(0.1, 300)
             wrench = np.array([0, 0, fz, p[1] * fz, -p[0] * fz, 0])
-            inside = copsense.Polygon(SOLE).margin(p).distance >= margin
+            inside = copsense.polygon.Polygon(SOLE).margin(p).distance >= margin
             assert inside == bool(np.all(A @ wrench <= b))
 
 

@@ -10,8 +10,9 @@ import copsense
 from copsense.cop import contact_cops
 from copsense.errors import InvalidInputError
 from copsense.limits import NO_LIMITS, Limits
-from copsense.margins import limit_margins, limit_travel, margin_table
+from copsense.margins import limit_margins, margin_table
 from copsense.path import lateral_posture
+from copsense.scan import limit_travel
 
 D, HALF = 0.14, 0.03
 COP_ONLY = replace(NO_LIMITS, cop_margin=0.0)
@@ -50,8 +51,8 @@ def test_four_bars_travel_is_the_closed_form(four_bar, alpha, direction):
     travel = limit_travel(four_bar, family(alpha), COP_ONLY, direction)
     first = travel.first
     assert first.exact == pytest.approx(known_travel(alpha), abs=1e-9)
-    # At the centre the slope of either foot's CoP is 1 - alpha.
-    assert first.first_order == pytest.approx(HALF / (1 - alpha), rel=1e-9)
+    # Its wrenches are affine in the CoM, so that the slack's first order is exact.
+    assert first.first_order == pytest.approx(known_travel(alpha), rel=1e-9)
     assert first.margin.value == pytest.approx(HALF, abs=1e-12)
     unloading = "r_sole" if direction > 0 else "l_sole"
     assert first.margin.where == unloading
@@ -129,12 +130,16 @@ def test_first_order_is_the_margin_over_its_rate(rubbing, direction):
         for m in limit_travel(rubbing, TORQUE, LIMITS, direction).limits
     }
     for k, contact in enumerate(start.contacts):
-        # CoP: each edge in turn, at the speed along its normal.
+        # CoP: each edge's slack f_z (b - a p) in turn, over how fast it goes.
+        fz = found.equilibrium.wrenches[k, 2]
+        lost = -found.wrench_derivative[k, 2] @ found.basis.T @ tangent * direction
         expected = np.inf
         for a, p in zip(contact.polygon, np.roll(contact.polygon, -1, axis=0), strict=True):
             normal = np.array([p[1] - a[1], a[0] - p[0]]) / np.linalg.norm(p - a)
-            if normal @ slopes[k] > 1e-9:
-                expected = min(expected, (normal @ (a - cops[k]) - 0.005) / (normal @ slopes[k]))
+            left = normal @ (a - cops[k]) - 0.005
+            closing = fz * normal @ slopes[k] + left * lost
+            if closing > 1e-9:
+                expected = min(expected, fz * left / closing)
         assert travel[contact.name, "cop"].first_order == pytest.approx(expected, rel=1e-6)
         # Load: what is left over how fast it goes.
         rate = found.wrench_derivative[k, 2] @ found.basis.T @ tangent * direction
@@ -214,7 +219,7 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
     named = 0
     for criterion in (copsense.minimum_wrench(1.0), copsense.minimum_torque()):
         for side in (1, -1):
-            for found in copsense.limit_travel(stance, criterion, limits, side).limits:
+            for found in copsense.scan.limit_travel(stance, criterion, limits, side).limits:
                 if not found.exact:
                     continue
                 y = float(stance.com[1]) + side * found.exact
@@ -233,6 +238,6 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
     [({"reach": np.nan}, "reach"), ({"reach": 0.0}, "reach"), ({"samples": 0}, "1 sample or more")],
 )
 def test_a_search_of_nothing_is_refused(icub, options, says):
-    for search in (limit_travel, copsense.next_change):
+    for search in (limit_travel, copsense.scan.next_active_set_change):
         with pytest.raises(InvalidInputError, match=says):
             search(icub, copsense.minimum_torque(), Limits(), **options)

@@ -37,13 +37,15 @@ def test_margin_is_the_distance_to_the_nearest_edge_and_positive_inside():
     for _ in range(30):
         polygon = random_polygon(rng)
         for point in rng.uniform(-0.15, 0.15, (40, 2)):
-            margin = copsense.Polygon(polygon).margin(point)
+            margin = copsense.polygon.Polygon(polygon).margin(point)
             distance, edge = nearest_line(polygon, point)
             assert margin.distance == pytest.approx(distance, abs=1e-15)
             assert margin.edge == edge
             assert (margin.distance > 0) == winds_around(polygon, point)
             if margin.distance > 0:  # going out by the margin along the normal meets the edge
-                on = copsense.Polygon(polygon).margin(point + margin.distance * margin.normal)
+                on = copsense.polygon.Polygon(polygon).margin(
+                    point + margin.distance * margin.normal
+                )
                 assert on.distance == pytest.approx(0, abs=1e-15)
 
 
@@ -59,7 +61,7 @@ def test_margin_is_the_distance_to_the_nearest_edge_and_positive_inside():
     ],
 )
 def test_margin_names_the_side(point, distance, side, normal):
-    margin = copsense.Polygon(SOLE).margin(point)
+    margin = copsense.polygon.Polygon(SOLE).margin(point)
     assert margin.distance == pytest.approx(distance, abs=1e-15)
     assert margin.side == side
     np.testing.assert_allclose(margin.normal, normal, atol=1e-15)
@@ -69,24 +71,26 @@ def test_a_sole_of_two_points_has_its_two_ends():
     line = copsense.rectangle((0.0, 0.0), (-0.03, 0.05))
     line = copsense.Contact("any", polygon=line).polygon
     assert len(line) == 2
-    near, outside = (copsense.Polygon(line).margin((0.0, y)) for y in (0.04, -0.05))
+    near, outside = (copsense.polygon.Polygon(line).margin((0.0, y)) for y in (0.04, -0.05))
     assert near.distance == pytest.approx(0.01)
     assert near.side == "+y (left)"
     assert outside.distance == pytest.approx(-0.02)
     assert outside.side == "-y (right)"
 
 
-def travel_by_search(polygon, cop, gain):
-    """Shortest straight CoM travel that brings a CoP cop + gain @ travel to the sole's edge."""
+def travel_by_search(polygon, cop, gain, share, load_gain):
+    """Shortest straight CoM travel that uses up an edge's slack share (b - a cop)."""
     angles = np.linspace(0, 2 * np.pi, 20001)
+    towards = np.array([np.cos(angles), np.sin(angles)])
     shortest = np.inf
     for i, a in enumerate(polygon):
         along = polygon[(i + 1) % len(polygon)] - a
         normal = np.array([along[1], -along[0]]) / np.hypot(*along)
-        speed = normal @ gain @ [np.cos(angles), np.sin(angles)]
-        forwards = speed > 1e-9
+        distance = normal @ (a - cop)
+        closing = share * (normal @ gain @ towards) - distance * (load_gain @ towards)
+        forwards = closing > 1e-9
         if forwards.any():
-            shortest = min(shortest, np.min(normal @ (a - cop) / speed[forwards]))
+            shortest = min(shortest, np.min(share * distance / closing[forwards]))
     return shortest
 
 
@@ -95,7 +99,10 @@ def test_com_travel_is_the_shortest_that_brings_the_cop_to_an_edge(lateral_path,
     stance = off_centre(lateral_path.stances[row])
     found = copsense.cop_sensitivity(stance, copsense.minimum_torque())
     for k, contact in enumerate(stance.contacts):
-        shortest = travel_by_search(contact.polygon, found.cop[k], found.com_gain[k])
+        share = found.equilibrium.wrenches[k, 2] / stance.robot.weight
+        shortest = travel_by_search(
+            contact.polygon, found.cop[k], found.com_gain[k], share, found.load_gain[k]
+        )
         assert found.com_travel[k] > 0
         assert found.com_travel[k] == pytest.approx(shortest, rel=1e-6)
 
@@ -103,7 +110,7 @@ def test_com_travel_is_the_shortest_that_brings_the_cop_to_an_edge(lateral_path,
 def test_com_travel_is_negative_where_the_cop_is_off_the_sole(lateral_path):
     found = copsense.cop_sensitivity(lateral_path.stances[0], copsense.minimum_wrench(1.0))
     for k, contact in enumerate(found.equilibrium.stance.contacts):
-        assert copsense.Polygon(contact.polygon).margin(found.cop[k]).distance < 0
+        assert copsense.polygon.Polygon(contact.polygon).margin(found.cop[k]).distance < 0
         assert found.com_travel[k] < 0
 
 

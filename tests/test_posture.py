@@ -10,8 +10,8 @@ import copsense
 from copsense.posture import contact_error, supporting_joints
 
 MET = 1e-12  # m, rad
-COST = copsense.PostureCost(base_rotation=7.0, supporting=2.0, free=11.0)
-CENTRE_COST = copsense.PostureCost()
+COST = copsense.posture.PostureCost(base_rotation=7.0, supporting=2.0, free=11.0)
+CENTRE_COST = copsense.posture.PostureCost()
 
 
 def requests(stance):
@@ -82,7 +82,9 @@ def perturbed(stance, start, request, displacement):
     q = pin.integrate(stance.robot.model, stance.q, displacement)
     for _ in range(20):
         here = stance.at(q, check=False)
-        error = constraint_errors(copsense.Posture(here, np.zeros((29, 0)), 0), start, request)
+        error = constraint_errors(
+            copsense.posture.Posture(here, np.zeros((29, 0)), 0), start, request
+        )
         if np.abs(error).max() < 1e-13:
             break
         columns = [here.robot.velocity_index(joint) for joint in joints]
@@ -153,7 +155,7 @@ def test_retract_keeps_the_contacts_and_is_first_order_exact(stance_of, name, gr
     direction /= np.abs(direction).max()
     left = []
     for t in (4e-3, 2e-3, 1e-3):
-        moved = copsense.retract(stance, t * direction)
+        moved = copsense.posture.retract(stance, t * direction)
         assert np.abs(contact_error(moved, stance.placements)).max() < MET
         gone = pin.difference(model, stance.q, moved.q)
         left.append(np.abs(gone - t * direction).max())
@@ -161,5 +163,5 @@ def test_retract_keeps_the_contacts_and_is_first_order_exact(stance_of, name, gr
     assert left[0] < 10 * 4e-3**2
     np.testing.assert_allclose(np.array(left[:-1]) / left[1:], 4.0, rtol=0.05)
     np.testing.assert_allclose(
-        copsense.retract(stance, 0 * direction).q, stance.q, rtol=0, atol=1e-13
+        copsense.posture.retract(stance, 0 * direction).q, stance.q, rtol=0, atol=1e-13
     )

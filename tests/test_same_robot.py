@@ -119,7 +119,7 @@ def test_choice_of_tangent_basis_does_not_matter(posture):
     mix = np.linalg.qr(np.random.default_rng(8).standard_normal((17, 17)))[0]
     Z = found.basis @ mix
     forces, torques = found.equilibrium.derivative(Z)
-    other = copsense.CopSensitivity(
+    other = copsense.sensitivity.CopSensitivity(
         found.equilibrium, Z, found.cop, found.matrix @ mix, posture.unstack(forces), torques
     )
     # The derivatives along mixed motions are the mixed derivatives ...

@@ -104,7 +104,7 @@ def test_every_row_is_the_postures_own_result(swept, path):
             for name, value in expected.items():
                 np.testing.assert_array_equal(row[name].values, value, err_msg=name)
             for k, contact in enumerate(stance.contacts):
-                margin = copsense.Polygon(contact.polygon).margin(found.cop[k])
+                margin = copsense.polygon.Polygon(contact.polygon).margin(found.cop[k])
                 assert row["margin"].values[k] == margin.distance
                 assert row["margin_side"].values[k] == margin.side
     np.testing.assert_array_equal(swept["com_y"].values, path.values)
@@ -187,3 +187,17 @@ def test_contacts_without_a_sole_have_no_edge(icub):
     assert swept["sole_polygon"].sel(contact="hand").isnull().all()
     assert swept["sole_polygon"].sel(contact="l_sole").notnull().all()
     assert swept.attrs["contact_kinds"] == "surface, surface, point"
+
+
+def test_a_policy_and_limits_are_rejected_before_anything_is_solved(icub):
+    path = copsense.lateral_sweep(icub, -0.01, 0.01, 3)
+
+    def policy(q):
+        return copsense.solve_equilibrium(icub.at(q), TORQUE).wrenches
+
+    seen = []
+    with pytest.raises(copsense.CopsenseError, match="is a policy"):
+        copsense.sweep(path, [policy], copsense.Limits(), progress=seen.append)
+    assert not seen
+    with pytest.raises(copsense.CopsenseError, match="limits apply to a Criterion"):
+        copsense.cop_sensitivity(icub, policy, copsense.Limits())

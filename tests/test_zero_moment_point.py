@@ -38,7 +38,7 @@ def test_zmp_is_the_cop_of_the_wrench_that_inverse_dynamics_asks_for(posture, pl
     for v, a in motions(posture, 20, seed=1):
         f, m = base_wrench(posture.robot.model, posture.q, v, a)
         expected = (np.cross(n, m) + (n @ p0) * f) / (n @ f)
-        given = copsense.zero_moment_point(posture, v, a, plane)
+        given = copsense.cop.zero_moment_point(posture, v, a, plane)
         np.testing.assert_allclose(given, expected, rtol=0, atol=1e-10)
 
 
@@ -46,8 +46,8 @@ def test_zmp_is_the_cop_of_the_wrench_that_inverse_dynamics_asks_for(posture, pl
 def test_zmp_at_rest_is_the_projection_of_the_com(posture, plane):
     still = np.zeros(29)
     np.testing.assert_allclose(
-        copsense.zero_moment_point(posture, still, still, plane),
-        copsense.com_projection(posture, plane),
+        copsense.cop.zero_moment_point(posture, still, still, plane),
+        copsense.cop.com_projection(posture, plane),
         rtol=0,
         atol=1e-12,
     )
@@ -57,7 +57,7 @@ def test_zmp_leans_against_the_coms_acceleration(posture):
     # One mass on a stick: x_zmp = x - z a_x / g when the height and the spin stand still.
     a = np.zeros(29)
     a[:3] = pin.XYZQUATToSE3(posture.q[:7]).rotation.T @ [0.5, 0.2, 0.0]  # all of it, sideways
-    given = copsense.zero_moment_point(posture, np.zeros(29), a)
+    given = copsense.cop.zero_moment_point(posture, np.zeros(29), a)
     x, y, z = posture.com
     np.testing.assert_allclose(
         given, [x - z * 0.5 / 9.81, y - z * 0.2 / 9.81, 0], rtol=0, atol=1e-12
@@ -81,8 +81,8 @@ def test_fri_is_the_zmp_and_the_cop_while_the_foot_stands(posture):
     plane = Plane(tuple(place.translation), tuple(place.rotation[:, 2]))
     for v, a in motions(single, 10, seed=2):
         v, a = foot_at_rest(single, v, a)
-        fri = copsense.foot_rotation_indicator(single, "l_sole", v, a, plane)
-        zmp = copsense.zero_moment_point(single, v, a, plane)
+        fri = copsense.cop.foot_rotation_indicator(single, "l_sole", v, a, plane)
+        zmp = copsense.cop.zero_moment_point(single, v, a, plane)
         np.testing.assert_allclose(fri, zmp, rtol=0, atol=1e-10)
         # The foot's wrench by inverse dynamics, and its centre of pressure.
         f, m = base_wrench(single.robot.model, single.q, v, a)
@@ -105,18 +105,18 @@ def test_fri_of_a_turning_foot_leaves_out_its_inertia_but_not_its_weight(posture
     for v, a in motions(single, 10, seed=3):
         f, m = base_wrench(model, posture.q, v, a)
         f, m = f + weight, m + np.cross(where, weight)
-        given = copsense.foot_rotation_indicator(single, "l_sole", v, a)
+        given = copsense.cop.foot_rotation_indicator(single, "l_sole", v, a)
         expected = np.array([-m[1], m[0], 0]) / f[2]
         np.testing.assert_allclose(given, expected, rtol=0, atol=1e-10)
-        apart.append(np.abs(given - copsense.zero_moment_point(single, v, a)).max())
+        apart.append(np.abs(given - copsense.cop.zero_moment_point(single, v, a)).max())
     assert max(apart) > 1e-5
 
 
 def test_fri_of_a_foot_at_rest_on_two_feet_is_its_own_cop(posture):
     found = copsense.solve_equilibrium(posture, copsense.minimum_torque())
-    still, cops = np.zeros(29), copsense.contact_cops(found)
+    still, cops = np.zeros(29), copsense.cop.contact_cops(found)
     for k, name in enumerate(posture.contact_names):
-        fri = copsense.foot_rotation_indicator(
+        fri = copsense.cop.foot_rotation_indicator(
             posture, name, still, still, other_wrenches=found.wrenches
         )
         np.testing.assert_allclose(

@@ -112,7 +112,7 @@ class Criterion(ByContent):
         return found
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Criterion:
+    def from_dict(cls, data: object) -> Criterion:
         """The criterion that `to_dict` wrote.
 
         Raises:
@@ -143,6 +143,9 @@ def _term(data: object) -> TorqueTerm | WrenchTerm:
         _known(rest, ("weights", "reference", "scale"), "a wrench term")
         if "weights" not in rest:
             raise InvalidInputError("a wrench term has no weights. Give six numbers.")
+        if rest.get("reference") is not None:
+            what = "the reference of a wrench term"
+            rest["reference"] = finite_array(rest["reference"], what, (None, 6))
         return WrenchTerm(**rest)
     raise UnknownNameError("kind of term of a criterion", str(kind), ("torque", "wrench"))
 

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-import scipy.optimize
 from jaxtyping import Float
-from scipy.interpolate import CubicHermiteSpline
 
 from copsense.criterion import (
     Criterion,
@@ -24,13 +21,15 @@ from copsense.limits import Limits
 from copsense.margins import margin_table
 from copsense.path import PosturePath
 from copsense.posture import supporting_joints
-from copsense.sensitivity import cop_sensitivity
+from copsense.scan import PathScan, ScanPoint
 from copsense.stance import Stance
 
 Objective = Literal["travel", "gain"]
 NO_LIMIT = "none within the path"  # a score's first limit where the path ends before any
 _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
+_AT_BOUND = 1e-2  # of a parameter's logarithm: the search's resolution
+_SIMPLEX = (0.5, 0.1)  # first steps of the searches, in steps of the grid
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
@@ -82,20 +81,25 @@ class Design:
         criterion: the best one found.
         score: how it does.
         baselines: the minimum wrench (L = 1 m) and the minimum torque on the same path.
-        candidates: every criterion of the family that was looked at on a grid.
+        alternatives: the best of the minimum wrench over its characteristic length, by the same
+            objective, unless that is the family: what one parameter alone achieves.
+        candidates: every criterion of the family that was looked at on a grid, and the best.
         pareto: those of them that no other beats in both the objective and the torque norm,
             by rising torque norm.
         objective: ``"travel"`` or ``"gain"``.
         family: name of the family.
+        at_bound: parameters whose best value is a bound of the family: farther out may be better.
     """
 
     criterion: Criterion
     score: Score
     baselines: tuple[Score, ...]
+    alternatives: tuple[Score, ...]
     candidates: tuple[Score, ...]
     pareto: tuple[Score, ...]
     objective: Objective
     family: str
+    at_bound: tuple[str, ...]
 
 
 def design_criterion(
@@ -109,7 +113,7 @@ def design_criterion(
 ) -> Design:
     """Choose the parameters of a family that do best along a path.
 
-    A grid over the parameters, then a simplex search from its best point.
+    A grid over the parameters, then a wide and a narrow simplex search from the best point.
 
     Args:
         path: postures to either side of its middle one, such as a lateral sweep.
@@ -133,15 +137,11 @@ def design_criterion(
         )
     if grid < 2:
         raise InvalidInputError(f"the grid needs 2 values a parameter or more, got {grid}.")
-    axes = [np.log(np.geomspace(low, high, grid)) for low, high in family.bounds]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
-
     both = (minimum_wrench(1.0), minimum_torque())
     reach = min(score(path, limits, criterion, {}).travel for criterion in both)
     baselines = tuple(score(path, limits, criterion, {}, reach) for criterion in both)
 
-    def judge(logs: np.ndarray) -> Score | None:
-        values = [float(v) for v in np.exp(logs)]
+    def judge(family: Family, values: Sequence[float]) -> Score | None:
         named = dict(zip(family.parameters, values, strict=True))
         try:
             return score(path, limits, family.build(values), named, reach)
@@ -153,40 +153,86 @@ def design_criterion(
             return _BAD
         return -found.travel if objective == "travel" else found.worst_gain
 
-    looked: list[tuple[np.ndarray, Score]] = []
-    for point in points:
-        found = judge(point)
-        if found:
-            looked.append((point, found))
-        if progress:
-            progress(1)
-    if not looked:
+    looked, best = _search(family, judge, cost, grid, progress)
+    if best is None:
         raise InvalidInputError(
             f"no criterion of the family {family.name!r} works along this path. Try another."
         )
-    # Of equals, such as where the path ends before any limit, the one that strains least.
-    start = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
-    refined = scipy.optimize.minimize(
-        lambda logs: cost(judge(logs)),
-        start[0],
-        method="Nelder-Mead",
-        bounds=[(np.log(a), np.log(b)) for a, b in family.bounds],
-        options={"xatol": 1e-2, "fatol": 1e-6, "maxfev": 40 * len(axes)},
+    other = _search(LENGTHS, judge, cost, grid)[1] if family.name != LENGTHS.name else None
+    candidates = (*looked, best)
+    values = [best.parameters[name] for name in family.parameters]
+    at_bound = tuple(
+        name
+        for name, value, bounds in zip(family.parameters, values, family.bounds, strict=True)
+        if min(abs(np.log(value / bound)) for bound in bounds) <= _AT_BOUND
     )
-    best = judge(refined.x) or start[1]
-    if cost(best) > cost(start[1]) - _ROUNDING:
-        best = start[1]
-    candidates = (*(s for _, s in looked), best)
-    chosen = family.build([best.parameters[name] for name in family.parameters])
     return Design(
-        chosen,
+        family.build(values),
         best,
         baselines,
+        (other,) if other else (),
         candidates,
         pareto(candidates, cost),
         objective,
         family.name,
+        at_bound,
     )
+
+
+def _search(
+    family: Family,
+    judge: Callable[[Family, Sequence[float]], Score | None],
+    cost: Callable[[Score | None], float],
+    grid: int,
+    progress: Callable[[int], object] | None = None,
+) -> tuple[list[Score], Score | None]:
+    """The family's scores on a grid, and the best found from there; None where all fail."""
+    import scipy.optimize
+
+    low, high = np.log(np.array(family.bounds)).T
+    axes = [np.linspace(a, b, grid) for a, b in zip(low, high, strict=True)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
+
+    def at(logs: np.ndarray) -> Score | None:
+        # A bound stays what it was given as.
+        inside = [
+            bounds[int(log > a)] if log in (a, b) else float(np.exp(log))
+            for log, a, b, bounds in zip(logs, low, high, family.bounds, strict=True)
+        ]
+        return judge(family, inside)
+
+    looked: list[tuple[np.ndarray, Score]] = []
+    for point in points:
+        found = at(point)
+        if found:
+            looked.append((point, found))
+        if progress:
+            progress(1)
+    scores = [found for _, found in looked]
+    if not looked:
+        return scores, None
+    # Of equals, such as where the path ends before any limit, the one that strains least.
+    where, best = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
+    for size in _SIMPLEX:
+        # Inwards from a bound: clipped to it, the simplex would be flat and never leave it.
+        step = size * (high - low) / (grid - 1)
+        inwards = np.where(where + step <= high, step, -step)
+        refined = scipy.optimize.minimize(
+            lambda logs: cost(at(logs)),
+            where,
+            method="Nelder-Mead",
+            bounds=list(zip(low, high, strict=True)),
+            options={
+                "initial_simplex": np.vstack([where, where + np.diag(inwards)]),
+                "xatol": 1e-2,
+                "fatol": 1e-6,
+                "maxfev": 40 * len(axes),
+            },
+        )
+        found = at(refined.x)
+        if found and cost(found) < cost(best) - _ROUNDING:
+            where, best = refined.x, found
+    return scores, best
 
 
 def score(
@@ -199,7 +245,8 @@ def score(
     """How a criterion does along a path.
 
     Between the path's postures the limits' slacks are cubics through their values and derivatives:
-    the travel errs with the fourth power of the postures' distance.
+    the travel errs with the fourth power of the postures' distance. Postures beyond the travel and
+    `within` are not looked at.
 
     Args:
         path: postures to either side of its middle one.
@@ -209,35 +256,48 @@ def score(
         within: how far from the middle gain and torques are taken [m]; default the travel.
 
     Raises:
-        CopsenseError: the criterion fails at a posture of the path.
+        CopsenseError: the criterion fails at a posture that is looked at.
     """
-    middle = len(path) // 2
-    table = margin_table(path.stances[middle], limits)
-    rows, rates, gains, norms = [], [], [], []
-    for stance, tangent in zip(path.stances, path.tangents, strict=True):
-        result = cop_sensitivity(stance, criterion)
-        equilibrium = result.equilibrium
-        # Slacks are nearer to straight lines than distances, whose f_z falls towards a limit.
-        rows.append(table.slack(equilibrium.forces, equilibrium.torques))
-        df, dtau = (d[:, 0] for d in equilibrium.derivative(tangent[:, None]))
-        rates.append(table.slack(df, dtau) - table.slack(0.0 * df, 0.0 * dtau))
-        gains.append(max(np.linalg.norm(gain, 2) for gain in result.com_gain))
-        norms.append(float(np.sum(equilibrium.torques**2)))
-    along = path.values - path.values[middle]
-    ends = [_first_zero(np.array(rows), np.array(rates), along, middle, side) for side in (1, -1)]
-    travel, row = min(ends)
+    scan = PathScan(path, criterion)
+    table = margin_table(path.stances[len(path) // 2], limits)
+
+    def slack(point: ScanPoint) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+        return (
+            table.slack(point.forces, point.torques),
+            table.slack_rates(point.force_rates, point.torque_rates),
+        )
+
+    travel, reached = np.inf, NO_LIMIT
+    for side, end in ((1, path.values[-1]), (-1, path.values[0])):
+        # The one side need not be followed farther than the other goes.
+        found = scan.first(slack, side, reach=travel, exact=False)
+        length = abs(float(end) - scan.start)
+        if found and found.travel < travel:
+            travel, reached = found.travel, table.names[found.row]
+        elif not found and length < travel:
+            travel, reached = length, NO_LIMIT
     reach = travel if within is None else within
-    taken = np.abs(along) <= reach + _ROUNDING  # a posture at the very end counts on either side
-    reached = table.names[row] if row >= 0 else NO_LIMIT
+    # A posture at the very end counts on either side.
+    taken = [
+        scan.at(value) for value in path.values if abs(value - scan.start) <= reach + _ROUNDING
+    ]
     return Score(
         criterion.name,
         dict(parameters),
         travel,
         reached,
-        float(np.max(np.array(gains)[taken])),
-        float(np.sqrt(np.mean(np.array(norms)[taken]))),
+        float(max(np.linalg.norm(point.com_gain, 2, axis=(1, 2)).max() for point in taken)),
+        float(np.sqrt(np.mean([np.sum(point.torques**2) for point in taken]))),
         reach,
     )
+
+
+LENGTHS = Family(
+    "length",
+    ("characteristic_length",),
+    ((0.01, 3.0),),
+    lambda values: minimum_wrench(values[0], name="designed-wrench"),
+)
 
 
 def families(stance: Stance) -> dict[str, Family]:
@@ -261,12 +321,7 @@ def families(stance: Stance) -> dict[str, Family]:
         return mixed((minimum_torque(), 1.0), (minimum_wrench(length), share), name="designed-mix")
 
     found = [
-        Family(
-            "length",
-            ("characteristic_length",),
-            ((0.01, 3.0),),
-            lambda values: minimum_wrench(values[0], name="designed-wrench"),
-        ),
+        LENGTHS,
         Family("mix", ("characteristic_length", "wrench_share"), ((0.01, 3.0), (1e-4, 1.0)), mix),
     ]
     if free:
@@ -285,37 +340,12 @@ def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
         return groups
     depth: dict[str, list[str]] = {}
     for contact in stance.contacts:
-        chain = stance.robot.model.supports[stance.robot.frame(contact.frame).parentJoint]
-        for place, joint in enumerate(i for i in chain if i > 1):
+        for place, joint in enumerate(stance.limb(contact)):
             names = depth.setdefault(f"joint{place + 1}", [])
             name = stance.robot.model.names[joint]
             if name not in names:
                 names.append(name)
     return {place: tuple(names) for place, names in depth.items()}
-
-
-def _first_zero(
-    values: Float[np.ndarray, "N r"],
-    rates: Float[np.ndarray, "N r"],
-    along: Float[np.ndarray, " N"],
-    middle: int,
-    side: int,
-) -> tuple[float, int]:
-    """Travel at which a slack first reaches zero on one side, and its row; -1 if none does."""
-    if np.any(values[middle] < 0):
-        return 0.0, int(np.argmin(values[middle]))
-    indices = list(range(middle, len(along)) if side > 0 else range(middle, -1, -1))
-    for i, j in pairwise(indices):
-        crossed = np.flatnonzero((values[i] >= 0) & (values[j] < 0))
-        roots = []
-        for row in crossed:
-            ends = sorted((i, j))
-            slack = CubicHermiteSpline(along[ends], values[ends, row], rates[ends, row])
-            roots.append(float(scipy.optimize.brentq(slack, along[i], along[j], xtol=_ROUNDING)))
-        if roots:
-            first = int(np.argmin(np.abs(roots)))
-            return abs(roots[first]), int(crossed[first])
-    return float(abs(along[indices[-1]])), -1
 
 
 def pareto(candidates: Sequence[Score], cost: Callable[[Score], float]) -> tuple[Score, ...]:

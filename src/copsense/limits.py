@@ -90,7 +90,7 @@ class Limits:
         )
 
 
-NO_LIMITS = Limits(None, None, 8, None, None, None)
+NO_LIMITS = Limits(normal_force=None, friction=None, cop_margin=None, torsion=None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,28 +1,20 @@
-"""Margins: how far an equilibrium is from each limit, in its own unit and in CoM travel."""
+"""Margins: how far an equilibrium is from each limit, in the limit's own unit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
-import scipy.optimize
 from jaxtyping import Float
 
-from copsense.arrays import finite_number
 from copsense.contact import Contact
-from copsense.criterion import Criterion
-from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import LimitRows, Limits, limit_rows
-from copsense.path import lateral_posture
 from copsense.stance import Stance
-from copsense.statics import StaticEquilibrium, solve_equilibrium
+from copsense.statics import StaticEquilibrium
 
 # Of a margin, by the limit's kind; "N" for the others.
 UNITS = {"cop": "m", "torsion": "N m", "torque": "N m"}
-_STILL = 1e-12  # rates under which a margin does not change
-_PRECISION = 1e-9  # of an exact travel [m]
 
 
 @dataclass(frozen=True)
@@ -45,45 +37,6 @@ class LimitMargin:
     unit: str
 
 
-@dataclass(frozen=True)
-class LimitTravel:
-    """How far the CoM may go along a path until one limit is reached.
-
-    Attributes:
-        margin: the margin of the contact or joint to this kind of limit where the path begins.
-        name: the very limit that is met (another edge than the nearest one at the start, say);
-            where none is met within reach, the one predicted.
-        first_order: its travel predicted by the sensitivity there [m]; infinite if it moves away,
-            0 where it is beyond its bound already.
-        exact: its travel found along the path [m]; None if no such limit is met within reach.
-    """
-
-    margin: LimitMargin
-    name: str
-    first_order: float
-    exact: float | None
-
-
-@dataclass(frozen=True)
-class Travel:
-    """What the CoM meets on its way to one side.
-
-    Attributes:
-        direction: +1 towards world +y, -1 towards -y.
-        limits: every limit, the nearest by exact travel first.
-        reach: how far the path was followed [m]; less than asked where no posture was found.
-    """
-
-    direction: int
-    limits: tuple[LimitTravel, ...]
-    reach: float
-
-    @property
-    def first(self) -> LimitTravel | None:
-        """The limit met first, or None if none is met within reach."""
-        return self.limits[0] if self.limits and self.limits[0].exact is not None else None
-
-
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
     table = margin_table(equilibrium.stance, limits)
@@ -91,106 +44,11 @@ def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[Limit
     return tuple(table.margin(rows, values) for rows in table.groups)
 
 
-def limit_travel(
-    stance: Stance,
-    criterion: Criterion,
-    limits: Limits,
-    direction: int = 1,
-    *,
-    reach: float = 0.15,
-    samples: int = 15,
-) -> Travel:
-    """Travel of the CoM sideways until each limit binds, first order and exact.
-
-    The path is the lateral sweep's through this stance: CoM x held, postures nearest to it. The
-    wrenches are the criterion's own, without limits: the question is when they would be clipped.
-
-    Args:
-        stance: where the path begins.
-        criterion: what shares the load.
-        limits: what is to be met.
-        direction: +1 towards world +y, -1 towards -y.
-        reach: how far to look [m].
-        samples: postures looked at before the crossings are refined.
-
-    Raises:
-        InvalidInputError: a direction other than +1 or -1, or nothing to look at.
-    """
-    check_search(direction, reach, samples)
-    table = margin_table(stance, limits)
-    y0 = float(stance.com[1])
-
-    def at(y: float, near: Stance) -> tuple[Stance, np.ndarray]:
-        here, _ = lateral_posture(stance, y, near=near)
-        solved = solve_equilibrium(here, criterion)
-        return here, table.values(solved.forces, solved.torques)
-
-    start, tangent = lateral_posture(stance, y0)
-    begin = solve_equilibrium(start, criterion)
-    values = table.values(begin.forces, begin.torques)
-    df, dtau = (d[:, 0] for d in begin.derivative(tangent[:, None]))
-    rates = table.rates(begin, values, df, dtau) * direction
-
-    walked: list[tuple[float, Stance, np.ndarray]] = [(0.0, start, values)]
-    for step in np.linspace(0.0, reach, samples + 1)[1:]:
-        try:
-            walked.append((float(step), *at(y0 + direction * float(step), walked[-1][1])))
-        except CopsenseError:
-            break  # no posture, or no normal force, further on
-    closing = np.where(rates < -_STILL, -values / np.minimum(rates, -_STILL), np.inf)
-    closing = np.where(values < 0, 0.0, closing)
-    found = []
-    for rows in table.groups:
-        crossing = _first_crossing(rows, walked, lambda s, near: at(y0 + direction * s, near)[1])
-        row, exact = crossing or (int(rows[int(np.argmin(closing[rows]))]), None)
-        first = float(closing[row])
-        found.append(LimitTravel(table.margin(rows, values), table.names[row], first, exact))
-    found.sort(key=lambda f: (np.inf if f.exact is None else f.exact, f.first_order))
-    return Travel(direction, tuple(found), walked[-1][0])
-
-
-def check_search(direction: int, reach: float, samples: int) -> None:
-    """Refuse a search along the lateral path that has no side, no length or no posture.
-
-    Raises:
-        InvalidInputError: says which, and what would do.
-    """
-    if direction not in (1, -1):
-        raise InvalidInputError(f"the direction is +1 or -1 along world y, got {direction}.")
-    finite_number(reach, "the reach [m]", positive=True)
-    if samples < 1:
-        raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
-
-
-def _first_crossing(
-    rows: np.ndarray,
-    walked: list[tuple[float, Stance, np.ndarray]],
-    evaluate: Callable[[float, Stance], np.ndarray],
-) -> tuple[int, float] | None:
-    """The first row to be at its bound, and the travel at which it is; None if all stay within."""
-    begin = walked[0][2][rows]
-    if np.any(begin < 0):
-        return int(rows[int(np.argmin(begin))]), 0.0
-    for (a, near, before), (b, _, after) in pairwise(walked):
-        crossed = [i for i in rows if before[i] >= 0 > after[i]]
-        if crossed:
-            roots = []
-            for i in crossed:
-
-                def one(s: float, row: int = i, start: Stance = near) -> float:
-                    return float(evaluate(s, start)[row])
-
-                root = float(scipy.optimize.brentq(one, a, b, xtol=_PRECISION))
-                roots.append((root, int(i)))
-            travel, row = min(roots)
-            return row, travel
-    return None
-
-
 class MarginTable:
     """Rows of limits in their own units, grouped by contact or joint and kind.
 
-    Made once, it serves every equilibrium of a path.
+    Made once, it serves every equilibrium of a path. Forces (..., m) are stacked over the contacts,
+    torques (..., n) over the joints; results have their leading dimensions.
 
     Attributes:
         names: what each row limits (r,).
@@ -201,7 +59,7 @@ class MarginTable:
 
     def __init__(self, contacts: Sequence[Contact], rows: LimitRows) -> None:
         """Lay the rows of these contacts, from `limit_rows`, out."""
-        self.contact_rows, self.fz = rows, _normal_rows(contacts)
+        self.contact_rows, fz = rows, _normal_rows(contacts)
         self.joint, self.sign = rows.joint, rows.sign
         self.limit = rows.torque[self.joint]
         self.names = rows.names + rows.torque_names
@@ -209,8 +67,9 @@ class MarginTable:
         self.where = tuple(contacts[k].name for k in rows.contacts) + tuple(
             rows.joints[i] for i in self.joint
         )
-        self.is_cop = np.array([kind == "cop" for kind in rows.kinds], dtype=bool)
-        self.row_fz = self.fz[np.array(rows.contacts, dtype=int)]
+        # Rows of the centres of pressure, and of the normal force under each of them.
+        self._cop = np.flatnonzero([kind == "cop" for kind in rows.kinds])
+        self._under = fz[np.array(rows.contacts, dtype=int)[self._cop]]
         keys = list(zip(self.where, self.kinds, strict=True))
         self.groups = [
             np.array([i for i, other in enumerate(keys) if other == key])
@@ -218,36 +77,49 @@ class MarginTable:
         ]
 
     def values(
-        self, forces: Float[np.ndarray, " m"], torques: Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, " r"]:
+        self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]
+    ) -> Float[np.ndarray, "*p r"]:
         """Signed distance of each row [m, N or N m]."""
         values = self.slack(forces, torques)
         # A CoP row is f_z (b - a p): its distance is that over f_z.
-        values[: len(self.is_cop)][self.is_cop] /= forces[self.row_fz[self.is_cop]]
+        values[..., self._cop] /= forces[..., self._under]
         return values
 
     def slack(
-        self, forces: Float[np.ndarray, " m"], torques: Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, " r"]:
-        """The same as forces and moments, b - A f [N, N m], so linear in the forces."""
-        contact = self.contact_rows.bound - self.contact_rows.matrix @ forces
-        return np.concatenate([contact, self.limit - self.sign * torques[self.joint]])
+        self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]
+    ) -> Float[np.ndarray, "*p r"]:
+        """The same as forces and moments, b - A f [N, N m], so linear in the forces.
 
-    def rates(
-        self,
-        at: StaticEquilibrium,
-        values: Float[np.ndarray, " r"],
-        df: Float[np.ndarray, " m"],
-        dtau: Float[np.ndarray, " n"],
-    ) -> Float[np.ndarray, " r"]:
-        """Derivatives of `values` along a motion that changes forces and torques by df, dtau."""
-        change, cop = -self.contact_rows.matrix @ df, self.is_cop
-        k = len(change)
-        fz = self.row_fz[cop]
-        change[cop] = (change[cop] - values[:k][cop] * df[fz]) / at.forces[fz]
-        return np.concatenate([change, -self.sign * dtau[self.joint]])
+        Of a centre of pressure it is f_z (b - a p): affine in the CoM where the wrenches are, and
+        negative for at least one edge where the contact pulls.
+        """
+        contact = self.contact_rows.bound - forces @ self.contact_rows.matrix.T
+        return np.concatenate([contact, self.limit - self.sign * torques[..., self.joint]], axis=-1)
 
-    def margin(self, rows: np.ndarray, values: np.ndarray) -> LimitMargin:
+    def slack_rates(
+        self, force_rates: Float[np.ndarray, "*p m"], torque_rates: Float[np.ndarray, "*p n"]
+    ) -> Float[np.ndarray, "*p r"]:
+        """Derivatives of `slack` along a motion that changes forces and torques at these rates."""
+        contact = -force_rates @ self.contact_rows.matrix.T
+        return np.concatenate([contact, -self.sign * torque_rates[..., self.joint]], axis=-1)
+
+    def group_margins(
+        self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]
+    ) -> Float[np.ndarray, "*p g"]:
+        """The smallest margin of each group; NaN to a sole's edge where its contact does not push.
+
+        Such a contact has no centre of pressure.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = self.values(forces, torques)
+        pushes = forces[..., self._under] > 0
+        values[..., self._cop] = np.where(pushes, values[..., self._cop], np.nan)
+        margins = np.empty((*values.shape[:-1], len(self.groups)))
+        for i, rows in enumerate(self.groups):
+            margins[..., i] = values[..., rows].min(axis=-1)
+        return margins
+
+    def margin(self, rows: np.ndarray, values: Float[np.ndarray, " r"]) -> LimitMargin:
         """The smallest of a group."""
         i = int(rows[int(np.argmin(values[rows]))])
         kind = self.kinds[i]

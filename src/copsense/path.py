@@ -1,10 +1,12 @@
-"""PosturePath: stances along a curve on the constraint manifold, with the curve's exact tangent."""
+"""PosturePath: stances along a curve on the constraint manifold, with the curve's exact tangent.
+
+`LateralPath` is the same for a search: its postures are solved when they are asked for.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,14 +14,18 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_number
-from copsense.errors import CopsenseError, InvalidInputError
-from copsense.posture import Posture, PostureCost, contact_error, pull_back, solve_posture
+from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
+from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
 from copsense.stance import Stance
 
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
 
-@dataclass(frozen=True, eq=False)
+# A value of a path's coordinate, and a stance to start from -> the posture there and its tangent.
+PostureSolver = Callable[[float, Stance], tuple[Stance, Float[np.ndarray, " nv"]]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class PosturePath:
     """Stances along a curve on the constraint manifold, parametrised by a named coordinate.
 
@@ -31,6 +37,8 @@ class PosturePath:
         tangents: dq/dcoordinate at each posture (N, nv), with J t = 0.
         failures: index of a posture that could not be reached -> the reason; the stance kept
             there is the one that the path began with.
+        solver: value of the coordinate, a stance to start from -> the posture there and its
+            tangent, for `at`; None where the path is only a list of configurations.
     """
 
     stances: tuple[Stance, ...]
@@ -39,10 +47,55 @@ class PosturePath:
     values: Float[np.ndarray, " N"]
     tangents: Float[np.ndarray, "N nv"]
     failures: Mapping[int, str] = field(default_factory=dict)
+    solver: PostureSolver | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         """Number of postures."""
         return len(self.stances)
+
+    def __iter__(self) -> Iterator[tuple[Stance, Float[np.ndarray, " nv"]]]:
+        """Each stance with the path's tangent there."""
+        return iter(zip(self.stances, self.tangents, strict=True))
+
+    def __repr__(self) -> str:
+        """Robot, coordinate, its range, and how many postures were not reached."""
+        failed = f", {len(self.failures)} not reached" if self.failures else ""
+        return (
+            f"PosturePath({self.stances[0].robot.name!r}, {len(self)} postures, {self.coordinate} "
+            f"from {self.values[0]:.4g} to {self.values[-1]:.4g} {self.unit}{failed})"
+        )
+
+    @property
+    def continuous(self) -> bool:
+        """Whether `at` gives the postures in between."""
+        return self.solver is not None
+
+    def at(self, value: float) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+        """The stance and the tangent at a value of the coordinate, exact there.
+
+        Raises:
+            UnreachablePostureError: no posture was found there.
+            InvalidInputError: the path is a list of configurations, with nothing in between.
+        """
+        i = int(np.argmin(np.abs(self.values - value)))
+        if self.values[i] == value:
+            if i in self.failures:
+                raise UnreachablePostureError(self.failures[i])
+            return self.stances[i], self.tangents[i]
+        if self.solver is None:
+            raise InvalidInputError(
+                f"the path is a list of configurations: it has no posture at {self.coordinate} = "
+                f"{value:g}. Ask at one of its values, or make the path with lateral_sweep or "
+                "joint_sweep."
+            )
+        known = [k for k in range(len(self)) if k not in self.failures]
+        nearest = min(known, key=lambda k: abs(self.values[k] - value), default=i)
+        return self.solver(value, self.stances[nearest])
+
+    def shifted(self, by: float) -> PosturePath:
+        """The same path with `by` added to its coordinate."""
+        solver = self.solver and _Shifted(self.solver, by)
+        return replace(self, values=self.values + by, solver=solver)
 
     def joint_rates(self, joint: str) -> Float[np.ndarray, " N"]:
         """d joint / d coordinate at each posture (N,)."""
@@ -79,13 +132,9 @@ def lateral_sweep(
         com_x = float(np.mean([world.translation[0] for world in stance.placements]))
     if com_x is not None:
         com_x = finite_number(com_x, "com_x [m]")
-
-    def request(y: float) -> dict[str, Any]:
-        return {"com": (com_x, y, None), "cost": cost}
-
     values = _grid(start, stop, count)
-    column = 0 if com_x is None else 1
-    return _sweep(stance, "com_y", "m", values, float(stance.com[1]), request, column, progress)
+    solver = _Lateral(stance, com_x, cost)
+    return _sweep(stance, "com_y", "m", values, float(stance.com[1]), solver, progress)
 
 
 def lateral_posture(
@@ -98,10 +147,66 @@ def lateral_posture(
         y: world y of the CoM [m].
         near: where to start the search; default `stance`.
     """
-    planar = stance.robot.base_nv != 6
-    com = (None if planar else float(stance.com[0]), y, None)
-    found = solve_posture(near or stance, com=com, reference=stance.q)
-    return found.stance, found.tangents[:, 0 if planar else 1]
+    return _Lateral(stance, _held_x(stance), None)(y, near or stance)
+
+
+class LateralPath:
+    """The lateral path of a stance for a search: CoM y to either side, CoM x held.
+
+    A posture is solved when it is asked for, and kept: analyses that share the path share them.
+
+    Attributes:
+        stance: the posture that every other stays nearest to, in the middle of the path.
+        coordinate: ``"com_y"``.
+        values: world y of the CoM where a search looks first (2 * samples + 1,), rising [m].
+    """
+
+    coordinate = "com_y"
+    continuous = True
+
+    def __init__(self, stance: Stance, reach: float = 0.15, samples: int = 15) -> None:
+        """Lay out where to look; nothing is solved yet.
+
+        Args:
+            stance: where the path begins.
+            reach: how far the path goes to either side [m].
+            samples: postures to either side that a search looks at first.
+
+        Raises:
+            InvalidInputError: no length, or no posture.
+        """
+        reach = finite_number(reach, "the reach [m]", positive=True)
+        if samples < 1:
+            raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
+        self.stance = stance
+        self.values = float(stance.com[1]) + np.linspace(-reach, reach, 2 * samples + 1)
+        self._solver = _Lateral(stance, _held_x(stance), None)
+        self._found: dict[float, tuple[Stance, np.ndarray] | str] = {}
+
+    def __len__(self) -> int:
+        """Number of postures that a search looks at first."""
+        return len(self.values)
+
+    def at(self, value: float) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+        """The stance and the tangent at a world y of the CoM [m].
+
+        Raises:
+            UnreachablePostureError: no posture was found there.
+        """
+        value = float(value)
+        if value not in self._found:
+            solved = [y for y, found in self._found.items() if not isinstance(found, str)]
+            nearest = min(solved, key=lambda y: abs(y - value), default=None)
+            near = self.stance if nearest is None else self._found[nearest][0]
+            assert isinstance(near, Stance)
+            try:
+                self._found[value] = self._solver(value, near)
+            except CopsenseError as error:
+                self._found[value] = str(error)
+        found = self._found[value]
+        if isinstance(found, str):
+            raise UnreachablePostureError(found)
+        return found
 
 
 def joint_sweep(
@@ -128,12 +233,9 @@ def joint_sweep(
     robot = stance.robot
     now = robot.joint_position(stance.q, joint)
 
-    def request(position: float) -> dict[str, Any]:
-        return {"joints": {joint: position}, "cost": cost}
-
-    return _sweep(
-        stance, joint, robot.joint_unit(joint), _grid(start, stop, count), now, request, 0, progress
-    )
+    solver = _OfJoint(stance, joint, cost)
+    values = _grid(start, stop, count)
+    return _sweep(stance, joint, robot.joint_unit(joint), values, now, solver, progress)
 
 
 def path_through(
@@ -207,40 +309,81 @@ def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
     return np.linspace(start, stop, int(count))
 
 
+def _held_x(stance: Stance) -> float | None:
+    """World x at which a lateral path holds the CoM; a planar robot has none to hold."""
+    return float(stance.com[0]) if stance.robot.base_nv == 6 else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Lateral:
+    """Postures of a lateral path; classes and not closures, so that a path can be sent away."""
+
+    stance: Stance
+    com_x: float | None
+    cost: PostureCost | None
+
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+        com = (self.com_x, value, None)
+        found = solve_posture(near, com=com, reference=self.stance.q, cost=self.cost)
+        return found.stance, found.tangents[:, 0 if self.com_x is None else 1]
+
+
+@dataclass(frozen=True, eq=False)
+class _OfJoint:
+    """Postures of a joint's path."""
+
+    stance: Stance
+    joint: str
+    cost: PostureCost | None
+
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+        held = {self.joint: value}
+        found = solve_posture(near, joints=held, reference=self.stance.q, cost=self.cost)
+        return found.stance, found.tangents[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shifted:
+    """Postures of a path whose coordinate was shifted."""
+
+    solver: PostureSolver
+    by: float
+
+    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+        return self.solver(value - self.by, near)
+
+
 def _sweep(
     stance: Stance,
     coordinate: str,
     unit: str,
     values: np.ndarray,
     now: float,
-    request: Callable[[float], dict[str, Any]],
-    column: int,
+    solver: PostureSolver,
     progress: Callable[[int], object] | None,
 ) -> PosturePath:
     """Solve outwards from the value nearest to `now`, each posture started from its neighbour."""
     middle = int(np.argmin(np.abs(values - now)))
-    found: dict[int, Posture | str] = {}
+    found: dict[int, tuple[Stance, np.ndarray]] = {}
+    failures: dict[int, str] = {}
     for order in (range(middle, len(values)), range(middle - 1, -1, -1)):
-        near: Posture | None = None
-        if order.start == middle - 1 and isinstance(found.get(middle), Posture):
-            near = found[middle]  # type: ignore[assignment]
+        near = found[middle][0] if middle in found else stance
         for i in order:
             try:
-                start = near.stance if near else stance
-                near = solve_posture(start, reference=stance.q, **request(float(values[i])))
-                found[i] = near
+                found[i] = solver(float(values[i]), near)
+                near = found[i][0]
             except CopsenseError as error:
-                found[i] = str(error)
+                failures[i] = str(error)
             if progress:
                 progress(1)
-    stances, tangents, failures = [], [], {}
-    for i in range(len(values)):
-        result = found[i]
-        if isinstance(result, Posture):
-            stances.append(result.stance)
-            tangents.append(result.tangents[:, column])
-        else:
-            failures[i] = result
-            stances.append(stance)
-            tangents.append(np.zeros(stance.robot.model.nv))
-    return PosturePath(tuple(stances), coordinate, unit, values, np.array(tangents), failures)
+    unreached = (stance, np.zeros(stance.robot.model.nv))
+    postures = [found.get(i, unreached) for i in range(len(values))]
+    return PosturePath(
+        tuple(here for here, _ in postures),
+        coordinate,
+        unit,
+        values,
+        np.array([tangent for _, tangent in postures]),
+        dict(sorted(failures.items())),
+        solver,
+    )

@@ -73,7 +73,7 @@ class Polygon:
             inwards = float((turn / np.linalg.norm(before + after, axis=1).clip(1e-300)).min())
             # A star turns left at every vertex too, but goes round more than once.
             repeated = float(np.arctan2(turn, along).sum()) > 3 * np.pi
-        if repeated or inwards < -_FLAT or self.area < 0:
+        if repeated or inwards < -_FLAT:
             raise InvalidInputError(
                 "the polygon does not go round a convex figure counter-clockwise, each vertex "
                 "once. Use Polygon.hull(points), which puts any points in order."
@@ -224,13 +224,15 @@ class Polygon:
         """The part where normal p <= offset."""
         corners, beyond = self.vertices, self.vertices @ normal - offset
         kept: list[np.ndarray] = []
-        for i, j in zip(range(-1, len(corners) - 1), range(len(corners)), strict=True):
-            if (beyond[i] > _ROUNDING) != (beyond[j] > _ROUNDING):
+        for j in range(len(corners)):
+            i = j - 1
+            # A segment is crossed once, not there and back.
+            if (i >= 0 or len(corners) > 2) and (beyond[i] > _ROUNDING) != (beyond[j] > _ROUNDING):
                 share = np.clip(beyond[i] / (beyond[i] - beyond[j]), 0.0, 1.0)
                 kept.append(corners[i] + share * (corners[j] - corners[i]))
             if beyond[j] <= _ROUNDING:
                 kept.append(corners[j])
-        # A vertex on the line, and a segment's end, are met twice.
+        # A vertex on the line may be met twice.
         once = [p for i, p in enumerate(kept) if np.any(p != kept[i - 1]) or len(kept) == 1]
         return Polygon(np.array(once or kept[:1]).reshape(-1, 2))
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import finite_array, finite_number, owned
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.stance import Stance
 
@@ -41,7 +41,7 @@ class PostureCost:
             finite_number(getattr(self, name), f"the posture weight {name}", positive=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Posture:
     """A solved posture and how it moves when its request does.
 
@@ -56,6 +56,15 @@ class Posture:
     stance: Stance
     tangents: Float[np.ndarray, "nv r"]
     iterations: int
+
+    def __post_init__(self) -> None:
+        """Own the tangents."""
+        object.__setattr__(self, "tangents", owned(self.tangents))
+
+    def __repr__(self) -> str:
+        """The stance, and how many coordinates were requested."""
+        requests = self.tangents.shape[1]
+        return f"Posture({self.stance!r}, {requests} requested, {self.iterations} iterations)"
 
 
 def solve_posture(
@@ -202,10 +211,9 @@ def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
     """1 for every velocity between a contact and the base, 0 elsewhere (base: 0)."""
     mask = np.zeros(stance.robot.model.nv)
     for contact in stance.contacts:
-        for joint in stance.robot.model.supports[stance.robot.frame(contact.frame).parentJoint]:
-            if joint > 1:
-                model_joint = stance.robot.model.joints[joint]
-                mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
+        for joint in stance.limb(contact):
+            model_joint = stance.robot.model.joints[joint]
+            mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
     return mask
 
 

@@ -27,10 +27,8 @@ from copsense.statics import (
 )
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
-_MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _STILL = 1e-12  # gains under which nothing moves
 _ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
-_LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,44 +81,43 @@ class CopSensitivity:
         return self.gradient @ t / rate
 
     def one_sided(
-        self, tangent: ArrayLike, rate: float = 1.0
-    ) -> tuple[Float[np.ndarray, "nc 2"], Float[np.ndarray, "nc 2"]]:
-        """d cop / d coordinate before and after this point of a path (left, right).
-
-        They differ where a limit is touched without pressing; elsewhere both are `along`.
-        """
-        return self.one_side(tangent, -1, rate), self.one_side(tangent, 1, rate)
-
-    def one_side(
-        self, tangent: ArrayLike, side: int, rate: float = 1.0
+        self, tangent: ArrayLike, *, side: int, rate: float = 1.0
     ) -> Float[np.ndarray, "nc 2"]:
-        """d cop / d coordinate before (side -1) or after (+1) this point of a path.
+        """d cop / d coordinate just before (side -1) or after (+1) this point of a path.
+
+        The two differ where a limit is touched without pressing; elsewhere both are `along`.
+
+        Args:
+            tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6.
+            side: -1 or +1.
+            rate: d coordinate along that tangent.
 
         Raises:
-            InvalidInputError: besides what `along` refuses, no way was found on that side: the
-                limits may be infeasible there.
+            InvalidInputError: besides the reasons of `along`, another side, or no way was found on
+                that side: the limits may be infeasible there.
         """
+        if side not in (1, -1):
+            raise InvalidInputError(f"the side is -1 (before) or +1 (after), got {side}.")
         both = self.along(tangent, rate)
         equilibrium, t = self.equilibrium, np.asarray(tangent, dtype=float)
         if not isinstance(equilibrium, ConstrainedEquilibrium):
             return both
         forces = equilibrium.rates(side * (t if rate > 0 else -t)).forces
         wrenches = equilibrium.stance.unstack(forces)
-        return side * _cop_rate(equilibrium, self.cop, wrenches) / abs(rate)
+        return side * cop_rates(equilibrium, self.cop, wrenches) / abs(rate)
 
-    def active_set_changes(
-        self, tangent: ArrayLike
-    ) -> tuple[ActiveSetChange | None, ActiveSetChange | None]:
-        """The next limit to bind or to let go, back and forth along a path, to first order.
+    def next_active_set_change(self, tangent: ArrayLike) -> ActiveSetChange | None:
+        """The next limit to bind or to let go along a path, to first order.
 
-        `copsense.next_change` finds the exact one on the lateral path.
+        `copsense.scan.next_active_set_change` finds the exact one on the lateral path.
 
         Args:
-            tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6.
+            tangent: the path's tangent (nv,), admissible: J t = 0 within 1e-6. Its negative looks
+                the other way.
 
         Returns:
-            The first change against the tangent and the first along it, their `travel` in metres
-            of horizontal CoM; None where nothing changes, as without limits.
+            The first change along the tangent, its `travel` in metres of horizontal CoM; None
+            where nothing changes, as without limits.
 
         Raises:
             InvalidInputError: the motion moves a contact, or leaves the CoM over one point.
@@ -136,8 +133,8 @@ class CopSensitivity:
                 "measure by. Choose a path that moves it sideways."
             )
         if not isinstance(equilibrium, ConstrainedEquilibrium):
-            return None, None
-        return equilibrium.next_change(-t / speed), equilibrium.next_change(t / speed)
+            return None
+        return equilibrium.next_active_set_change(t / speed)
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint [m/rad] along a path with this tangent."""
@@ -145,28 +142,13 @@ class CopSensitivity:
         t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
         return self.along(t, float(t[index]))
 
-    @cached_property
+    @property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
         """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
 
-        v = Z S J_c' (J_c S J_c')^-1 = Z R (J_c R)^+ with S = (Z' M Z)^-1 = R R' and
-        J_c = J_com,xy Z. Where the contacts forbid a horizontal direction (the planar four-bar),
-        its part is zero.
+        See `Stance.com_motions`.
         """
-        Jc = self.equilibrium.stance.com_jacobian[:2] @ self.basis
-        R = self._inverse_root
-        return np.asarray(self.basis @ R @ np.linalg.pinv(Jc @ R, rcond=_LOST))
-
-    @cached_property
-    def _inverse_root(self) -> Float[np.ndarray, "p r"]:
-        """R with R R' = (Z' M Z)^-1, leaving out motions of massless links alone.
-
-        They have no energy to be measured by, and move no centre of mass.
-        """
-        energy = self.basis.T @ self.equilibrium.stance.mass_matrix @ self.basis
-        values, vectors = np.linalg.eigh(energy)
-        kept = values > _MASSLESS * values.max(initial=0.0)
-        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+        return self.equilibrium.stance.com_motions
 
     @cached_property
     def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
@@ -204,9 +186,9 @@ class CopSensitivity:
         whole mass would move.
         """
         # The largest singular value, 0 where the contacts leave nothing to move.
+        motions = self.equilibrium.stance.energy_motions
         speeds = [
-            np.linalg.svd(eta @ self._inverse_root, compute_uv=False).max(initial=0.0)
-            for eta in self.matrix
+            np.linalg.svd(eta @ motions, compute_uv=False).max(initial=0.0) for eta in self.gradient
         ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
@@ -264,7 +246,7 @@ def cop_sensitivity(
 ) -> CopSensitivity:
     """The sensitivity of every contact's centre of pressure along the admissible motions.
 
-    Analytic for a `Criterion`; for a law q -> wrenches by fourth-order central differences along
+    Analytic for a `Criterion`; for a policy q -> wrenches by fourth-order central differences along
     the constraint manifold.
 
     Args:
@@ -281,10 +263,19 @@ def cop_sensitivity(
     """
     if not isinstance(criterion, Criterion):
         return finite_difference_sensitivity(stance, criterion, limits, step=step)
-    equilibrium = solve_equilibrium(stance, criterion, limits)
-    Z = stance.admissible_motions
+    return sensitivity_of(solve_equilibrium(stance, criterion, limits))
+
+
+def sensitivity_of(equilibrium: StaticEquilibrium) -> CopSensitivity:
+    """The sensitivity at an equilibrium that a `Criterion` chose, without solving it again.
+
+    Raises:
+        UnloadedContactError: a contact carries no normal force.
+        UndeterminedWrenchError: the wrenches have no derivative at this very posture.
+    """
+    Z = equilibrium.stance.admissible_motions
     forces, torques = equilibrium.derivative(Z)
-    return _sensitivity(equilibrium, Z, stance.unstack(forces), torques)
+    return _sensitivity(equilibrium, Z, equilibrium.stance.unstack(forces), torques)
 
 
 def finite_difference_sensitivity(
@@ -341,7 +332,7 @@ def check_sensitivity(
     finite_number(tolerance, "the tolerance")
     if not isinstance(criterion, Criterion):
         raise InvalidInputError(
-            "a law is differentiated numerically: there is nothing to compare. Give a Criterion."
+            "a policy is differentiated numerically: there is nothing to compare. Give a Criterion."
         )
     exact = cop_sensitivity(stance, criterion, limits)
     numeric = finite_difference_sensitivity(stance, criterion, limits, step=step)
@@ -368,16 +359,19 @@ def _sensitivity(
     torque_derivative: np.ndarray,
 ) -> CopSensitivity:
     p = contact_cops(equilibrium)
-    matrix = _cop_rate(equilibrium, p, wrench_derivative)
+    matrix = cop_rates(equilibrium, p, wrench_derivative)
     return CopSensitivity(equilibrium, basis, p, matrix, wrench_derivative, torque_derivative)
 
 
-def _cop_rate(
+def cop_rates(
     equilibrium: StaticEquilibrium,
     cop: Float[np.ndarray, "nc 2"],
     change: Float[np.ndarray, "nc 6 *p"],
 ) -> Float[np.ndarray, "nc 2 *p"]:
-    """Quotient rule: dp = (d(-m_y, m_x) - p df_z) / f_z."""
+    """Derivatives of the centres of pressure where wrenches change so (nc, 6, ...).
+
+    Quotient rule: dp = (d(-m_y, m_x) - p df_z) / f_z.
+    """
     trailing = (1,) * (change.ndim - 2)
     moments = np.stack([-change[:, 4], change[:, 3]], axis=1)
     normal = equilibrium.wrenches[:, 2].reshape(-1, 1, *trailing)

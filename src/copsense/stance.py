@@ -27,6 +27,8 @@ from copsense.robot import Robot
 
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost.
 RANK_TOLERANCE = 1e-9
+_MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
+_LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
 # How far a contact may lie from its stated plane.
 POSITION_TOLERANCE = 1e-6  # m
 ANGLE_TOLERANCE = 1e-6  # rad
@@ -220,6 +222,29 @@ class Stance:
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
         """Orthonormal basis Z of the velocities that leave the contacts at rest: J Z = 0."""
         return self._svd[2][self.rank :].T.copy()
+
+    @cached_property
+    def energy_motions(self) -> Float[np.ndarray, "nv r"]:
+        """Admissible motions Z R of unit kinetic energy, with R R' = (Z' M Z)^-1.
+
+        Motions of massless links alone are left out: they have no energy to be measured by, and
+        move no centre of mass.
+        """
+        Z = self.admissible_motions
+        values, vectors = np.linalg.eigh(Z.T @ self.mass_matrix @ Z)
+        kept = values > _MASSLESS * values.max(initial=0.0)
+        return np.asarray(Z @ (vectors[:, kept] / np.sqrt(values[kept])))
+
+    @cached_property
+    def com_motions(self) -> Float[np.ndarray, "nv 2"]:
+        """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
+
+        v = Z S J_c' (J_c S J_c')^-1 = Z R (J_c R)^+ with S = (Z' M Z)^-1 = R R' and
+        J_c = J_com,xy Z. Where the contacts forbid a horizontal direction (the planar four-bar),
+        its part is zero.
+        """
+        motions = self.energy_motions
+        return np.asarray(motions @ np.linalg.pinv(self.com_jacobian[:2] @ motions, rcond=_LOST))
 
     @property
     def redundant_directions(self) -> tuple[str, ...]:

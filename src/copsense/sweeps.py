@@ -15,10 +15,10 @@ from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits
 from copsense.path import PosturePath
 from copsense.provenance import made_by
-from copsense.recorded import with_limit_margins
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
 from copsense.sweep_layout import SweepRows, sweep_dataset
+from copsense.sweep_margins import with_limit_margins
 
 if TYPE_CHECKING:
     import pandas as pd

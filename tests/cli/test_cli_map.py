@@ -77,7 +77,7 @@ def test_stopping_says_how_to_go_on(tmp_path):
     assert answer.code == 130
     assert "stopped: 80 of 135 postures" in answer.err
     assert "Run the same command again" in answer.err
-    assert copsense.map_summary(path).chunks_done == 2
+    assert copsense.maps.map_summary(path).chunks_done == 2
 
 
 @pytest.mark.parametrize(

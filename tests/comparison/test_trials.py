@@ -22,16 +22,15 @@ from copsense.comparison import (
     run_case,
 )
 from copsense.comparison.case_runner import CaseRunner
-from copsense.comparison.prediction import statics
 from copsense.comparison.score_kinds import SCORES
 from copsense.comparison.trials import trial_named
 from copsense.controllers import Ramp, Sine, lateral_reference
 from copsense.limits import Limits
 from copsense.path import lateral_sweep
 from copsense.sensitivity import cop_sensitivity
-from copsense.simulation.prediction import force_gaps, predict
+from copsense.simulation.prediction import predict
 
-LIMITS = Limits(10.0, 1.0, 8, 1e-3, None, None)
+LIMITS = Limits(normal_force=10.0, friction=1.0, cop_margin=1e-3, torsion=None)
 WITHIN = dataclasses.replace(C2, limits=LIMITS, name="")
 
 
@@ -173,11 +172,13 @@ def test_the_knees_of_a_quadruped_are_not_known():
 @pytest.mark.parametrize(("choice", "how"), [(C1, "left the ground"), (C2, "slipped")])
 def test_a_point_lifts_or_slips_where_the_statics_say(choice, how):
     stance = copsense.load_stance("solo12")
-    found = statics(lateral_reference(stance, Ramp(0.15)), choice.law)
+    found = predict(lateral_reference(stance, Ramp(0.15)), choice.law)
     forces = []
     for there in lateral_sweep(stance, 0.0, 0.99 * found.excursion, 3).stances:
         wrenches = copsense.solve_equilibrium(there, choice.law).wrenches
-        forces.append(force_gaps(there.contacts[0], wrenches[:, :3], 1.0))
+        mu = there.contacts[0].friction or 1.0
+        tangential = np.hypot(wrenches[:, 0], wrenches[:, 1])
+        forces.append([wrenches[:, 2], mu * wrenches[:, 2] - tangential])
     assert np.all(np.array(forces) > 0)
     assert (found.excursion < 0.12) == (how == "slipped")
     (case,) = make_plan([RobotChoice("solo12")], [PostureChoice()], [choice], [Lean(speed=0.03)])
@@ -194,11 +195,22 @@ def test_the_first_order_of_a_slip_is_that_of_the_path():
     free = [dataclasses.replace(contact, friction=None) for contact in own]
     stance = copsense.load_stance("go2", contacts=free)
     reference = lateral_reference(stance, Ramp(0.13))
-    found, near = statics(reference, C2.law, None, 0.7), predict(reference, C2.law, None, 0.7)
-    assert found.contact == near.contact
-    # That of the statics is the derivative, the other a difference over 2 mm.
-    assert found.first_order == pytest.approx(near.first_order, rel=0.01)
-    bare = statics(reference, C2.law, None, 1e9)
+    found = predict(reference, C2.law, None, 0.7)
+
+    def gaps(y):
+        """What friction and load leave each foot with the CoM at y from the start."""
+        there, _ = reference.path.at(y)
+        forces = copsense.solve_equilibrium(there, C2.law).wrenches
+        return np.append(0.7 * forces[:, 2] - np.hypot(*forces[:, :2].T), forces[:, 2])
+
+    # By differences over a tenth of a millimetre, from the start alone.
+    closing = (gaps(-1e-4) - gaps(1e-4)) / 2e-4
+    first = np.where(closing > 1e-9, gaps(0.0) / closing, np.inf)
+    assert found.first_order == pytest.approx(first.min(), rel=1e-5)
+    there = gaps(found.excursion)
+    assert there.min() == pytest.approx(0.0, abs=1e-6 * stance.robot.weight)
+    assert found.contact == stance.contact_names[int(np.argmin(there)) % len(own)]
+    bare = predict(reference, C2.law, None, 1e9)
     assert bare.excursion > found.excursion
 
 
@@ -213,19 +225,20 @@ def test_a_sway_that_is_cut_short_is_predicted_as_far_as_it_goes():
 def test_the_first_order_is_the_sensitivity_s(stance):
     reference = lateral_reference(stance, Ramp(0.05))
     for choice in (C1, C2):
-        found = statics(reference, choice.law)
-        assert found.excursion == predict(reference, choice.law).excursion
-        start = int(np.argmin(np.abs(np.asarray(reference.path.values))))
-        here = cop_sensitivity(reference.path.stances[start], choice.law)
-        slopes = here.gradient @ reference.path.tangents[start]
-        # By hand: the inner edge of the right sole, contact y = 31 mm.
-        by_hand = reference.path.values[start] + (0.031 - here.cop[1, 1]) / slopes[1, 1]
-        assert found.first_order == pytest.approx(by_hand, rel=1e-6)
+        found = predict(reference, choice.law)
+        there, tangent = reference.path.at(0.0)
+        here = cop_sensitivity(there, choice.law)
+        slope = (here.gradient @ tangent)[1, 1]
+        # By hand: the inner edge of the right sole, contact y = 31 mm; its slack f_z (b - a p).
+        fz, left = here.equilibrium.wrenches[1, 2], 0.031 - here.cop[1, 1]
+        load_rate = here.wrench_derivative[1, 2] @ here.basis.T @ tangent
+        by_hand = fz * left / (fz * slope - left * load_rate)
+        assert found.first_order == pytest.approx(by_hand, rel=1e-9)
         rate = np.gradient(found.torques, found.values, axis=0)
         near = int(np.argmin(np.abs(found.values)))
-        assert np.abs(found.torque_slope - rate[near]).max() < 0.02 * np.abs(rate[near]).max()
+        assert np.abs(found.start.torque_rates - rate[near]).max() < 0.02 * np.abs(rate[near]).max()
         still = np.zeros(2)
-        norm = np.linalg.norm(found.torque_start)
+        norm = np.linalg.norm(found.start.torques)
         assert found.torque_norm(still) == pytest.approx((norm, norm), rel=1e-6)
         margin = 0.031 - cop_sensitivity(stance, choice.law).cop[1, 1]
         assert found.smallest_margin(0.0, 0.0) == pytest.approx((margin, margin), rel=1e-3)

@@ -34,7 +34,7 @@ def test_torques_keep_moving_feet_in_place(robot, criterion):
         motion = home.admissible_motions @ random.uniform(
             -0.1, 0.1, home.admissible_motions.shape[1]
         )
-        stance = copsense.retract(home, motion)
+        stance = copsense.posture.retract(home, motion)
         # Fast enough that the feet would leave the ground if their drift were forgotten.
         basis = stance.admissible_motions
         v = basis @ random.uniform(-3.0, 3.0, basis.shape[1])

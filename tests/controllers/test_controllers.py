@@ -79,7 +79,7 @@ def test_the_same_holds_on_tilted_planes(icub):
 
 def test_torques_alone_determine_wrenches_and_sensitivity(posture):
     # Torques that hold the robot up leave the two feet one way to push.
-    law = copsense.wrench_policy(projected_gravity(posture), posture)
+    law = copsense.statics.wrench_policy(projected_gravity(posture), posture)
     assert_same(law, TORQUE, posture)
 
 
@@ -89,7 +89,7 @@ def test_a_controllers_own_torques_give_back_its_wrenches(posture):
         def torques(q, criterion=criterion):
             return copsense.solve_equilibrium(posture.at(q), criterion).torques
 
-        law = copsense.wrench_policy(torques, posture)
+        law = copsense.statics.wrench_policy(torques, posture)
         found = copsense.solve_equilibrium(posture, criterion)
         np.testing.assert_allclose(law(posture.q), found.wrenches, rtol=0, atol=1e-9)
 

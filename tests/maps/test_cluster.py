@@ -59,13 +59,13 @@ def test_a_command_killed_and_resumed_leaves_the_store_as_one_process_does(
         time.sleep(0.01)
     process.kill()
     process.wait()
-    assert 5 <= copsense.map_summary(killed).chunks_done < 40
+    assert 5 <= copsense.maps.map_summary(killed).chunks_done < 40
     done = subprocess.run([*command, str(killed)], env=environment, capture_output=True, text=True)
     assert done.returncode == 1, done.stderr  # some postures are out of reach
     assert "Traceback" not in done.stderr
     axes = (Axis("com_y", -0.05, 0.05), Axis("com_z", 0.46, 0.52))
     copsense.map_postures(icub, Sample(axes, 4000, seed=3), both, whole, chunk=100)
-    assert copsense.map_summary(killed).complete
+    assert copsense.maps.map_summary(killed).complete
     assert same(killed, whole)
 
 

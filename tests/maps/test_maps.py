@@ -100,7 +100,7 @@ def test_a_map_resumed_or_cut_among_threads_is_the_same_bits(
 
     with pytest.raises(StopError):
         copsense.map_postures(icub, sample, both, path, chunk=32, progress=stop)
-    partial = copsense.map_summary(path)
+    partial = copsense.maps.map_summary(path)
     assert (partial.chunks_done, partial.complete) == (3, False)
     resumed = []
     found = copsense.map_postures(
@@ -150,7 +150,9 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
                 continue
             here = icub.at(q)
             own = copsense.solve_equilibrium(here, criterion)
-            nearest = min(m.value for m in copsense.limit_margins(own, limits) if m.kind == "cop")
+            nearest = min(
+                m.value for m in copsense.margins.limit_margins(own, limits) if m.kind == "cop"
+            )
             found = dataset["limit_margin"].sel(limit="cop").values[row, j]
             assert found == pytest.approx(nearest, rel=1e-5, abs=1e-6)
             reason = dataset["reason"].values[row, j]

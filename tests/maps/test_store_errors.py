@@ -99,7 +99,7 @@ def test_a_full_disk_is_one_error_and_the_map_goes_on_after_it(
     with pytest.raises(OutputError, match=r"No space left .* chunks that are done are kept; free"):
         copsense.map_postures(icub, sample, both, path, chunk=32)
     monkeypatch.undo()
-    assert 0 < copsense.map_summary(path).chunks_done < 10
+    assert 0 < copsense.maps.map_summary(path).chunks_done < 10
     copsense.map_postures(icub, sample, both, path, chunk=32)
     assert same(path, whole[0])
 

@@ -382,7 +382,9 @@ def test_a_moving_robot_meets_its_limits_there_to_first_order(grounded, criterio
         step = corner - stance.com[:2]
         v = sensitivity.com_motions @ step
         forces = [
-            copsense.solve_equilibrium(copsense.retract(stance, s * h * v), CRITERIA[criterion])
+            copsense.solve_equilibrium(
+                copsense.posture.retract(stance, s * h * v), CRITERIA[criterion]
+            )
             for s in (-1, 1)
         ]
         rate = (forces[1].forces - forces[0].forces) / (2 * h)
@@ -575,7 +577,7 @@ def test_nothing_stands_on_a_slope_without_friction(stance_of):
         replace(c, friction=0.0, plane=Plane((0.0, 0.0, 0.0), (0.2, 0.0, 1.0)))
         for c in flat.contacts
     ]
-    stance = copsense.stand(flat.robot, contacts, flat.q)
+    stance = copsense.robots.stand(flat.robot, contacts, flat.q)
     with pytest.raises(InfeasibleError) as caught:
         com_region(stance, Limits())
     assert any("slips" in name for name in caught.value.demands)

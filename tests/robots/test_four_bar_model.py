@@ -68,10 +68,10 @@ def planar_minimum(four_bar, xi, weights, *, no_tangential=False):
 
 
 def stance_at(four_bar, xi):
-    robot = copsense.four_bar_robot(
+    robot = copsense.robots.four_bar_robot(
         four_bar.leg_length, four_bar.rod_length, four_bar.leg_mass, four_bar.body_mass
     )
-    return copsense.Stance(robot, robot.configuration(copsense.four_bar_angles(xi)), FEET)
+    return copsense.Stance(robot, robot.configuration(copsense.robots.four_bar_angles(xi)), FEET)
 
 
 def motion(four_bar, xi):

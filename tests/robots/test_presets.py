@@ -8,7 +8,7 @@ import copsense
 BIPEDS = {"icub", "talos", "romeo", "g1", "human"}
 
 
-@pytest.mark.parametrize("name", [name for name in copsense.PRESETS if name != "four_bar"])
+@pytest.mark.parametrize("name", [name for name in copsense.robots.PRESETS if name != "four_bar"])
 def test_preset_stands_on_level_ground_with_its_com_over_the_middle_of_its_feet(stance_of, name):
     stance = stance_of(name)
     origins = np.array([place.translation for place in stance.placements])
@@ -29,7 +29,7 @@ def test_bipeds_face_x_with_the_left_foot_at_y(stance_of, name):
     assert left.translation[1] > 0.03 > -0.03 > right.translation[1]
     for place, contact in zip(stance.placements, stance.contacts, strict=True):
         assert place.rotation[0, 0] > 0.9
-        assert copsense.Polygon(contact.polygon).margin((0.0, 0.0)).distance > 0.02
+        assert copsense.polygon.Polygon(contact.polygon).margin((0.0, 0.0)).distance > 0.02
 
 
 def test_four_bar_stands_as_the_papers_at_a_right_angle(stance_of):
@@ -44,14 +44,14 @@ def test_four_bar_stands_as_the_papers_at_a_right_angle(stance_of):
 def test_icubs_sole_is_what_its_mesh_shows():
     # Lowest millimetre of the collision mesh of iCubGenova04: 10.5 mm under the sole's frame.
     robot = copsense.load_robot("icub")
-    sole = copsense.read_sole(robot, copsense.Contact("l_sole"))
+    sole = copsense.sole.read_sole(robot, copsense.Contact("l_sole"))
     assert sole.height == pytest.approx(-0.0105, abs=5e-5)
     assert len(sole.polygon) == 74
     low, high = sole.polygon.min(axis=0), sole.polygon.max(axis=0)
     np.testing.assert_allclose(low, [-0.066, -0.0435], rtol=0, atol=5e-5)
     np.testing.assert_allclose(high, [0.129, 0.0515], rtol=0, atol=5e-5)
     # The right one is its mirror image.
-    other = copsense.read_sole(robot, copsense.Contact("r_sole")).polygon
+    other = copsense.sole.read_sole(robot, copsense.Contact("r_sole")).polygon
     np.testing.assert_allclose(other.min(axis=0)[1], -high[1], rtol=0, atol=1e-4)
 
 

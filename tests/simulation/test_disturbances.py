@@ -128,7 +128,7 @@ def test_odometry_finds_the_base_of_a_robot_whose_foot_stands():
         odometry = FootOdometry(stance, foot)
         for _ in range(5):
             motion = stance.admissible_motions @ random.uniform(-0.3, 0.3, 17)
-            moved = copsense.retract(stance, 0.2 * motion)
+            moved = copsense.posture.retract(stance, 0.2 * motion)
             speed = moved.admissible_motions @ random.uniform(-1, 1, 17)
             hidden = moved.q.copy()
             hidden[:7] = [9.0, 9.0, 9.0, 0.0, 0.0, 0.0, 1.0]

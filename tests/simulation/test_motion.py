@@ -71,7 +71,7 @@ def test_a_slow_sine_is_tracked():
 def test_limits_carry_the_com_past_the_tip():
     from copsense.limits import Limits
 
-    limits = Limits(10.0, 1.0, 8, 1e-3, None, None)
+    limits = Limits(normal_force=10.0, friction=1.0, cop_margin=1e-3, torsion=None)
     controller = BalancingController(icub(), C1, limits=limits)
     signal = Ramp(0.04, 0.02)
     recording = rollout(simulator(), controller, Scenario(signal.duration + 0.3, signal))
@@ -85,7 +85,7 @@ def test_limits_that_do_not_bind_change_nothing():
 
     pair = [
         rollout(simulator(), BalancingController(icub(), C2, limits=limits), Scenario(0.1))
-        for limits in (None, Limits(1.0, 1.0, 8, 0.0, None, "model"))
+        for limits in (None, Limits(normal_force=1.0, friction=1.0, torsion=None, torque="model"))
     ]
     assert pair[0].equals(pair[1])
 
@@ -144,10 +144,10 @@ def test_a_ramp_arrives_without_a_jump():
 def test_the_prediction_says_both_orders():
     prediction = predict_lean(icub(), C1, -0.05)
     assert prediction.contact == "l_sole"
-    # Criterion 1 is affine in the CoM: its first order is nearly exact, criterion 2's is not.
-    assert prediction.first_order == pytest.approx(prediction.excursion, rel=3e-3)
+    # Criterion 1 is affine in the CoM: its first order is exact, criterion 2's is not.
+    assert prediction.first_order == pytest.approx(prediction.excursion, abs=1e-9)
     other = predict_lean(icub(), C2, 0.05)
-    assert other.first_order > 1.2 * other.excursion
+    assert 1.04 * other.excursion < other.first_order < 1.1 * other.excursion
     # A sine goes as far to either side, and to one of them first.
     for amplitude, contact in ((0.05, "r_sole"), (-0.05, "l_sole")):
         sine = predict(lateral_reference(icub(), Sine(amplitude, 0.1)), C1)

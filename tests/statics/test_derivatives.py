@@ -15,7 +15,7 @@ def posture(lateral_path):
     """A posture of no symmetry, off the centre."""
     stance = lateral_path.stances[11]
     coordinates = 0.15 * np.random.default_rng(0).standard_normal(17)
-    return copsense.retract(stance, stance.admissible_motions @ coordinates)
+    return copsense.posture.retract(stance, stance.admissible_motions @ coordinates)
 
 
 @pytest.mark.parametrize("name", CRITERIA)

@@ -47,7 +47,7 @@ def test_slope_steeper_than_its_friction(icub):
     # tan(0.3) = 0.309; the tangential demand of a pyramid with a side across the slope.
     slope = Plane((0, 0, 0), (np.sin(0.3), 0.0, np.cos(0.3)))
     contacts = [replace(c, plane=slope, friction=0.2) for c in icub.contacts]
-    stance = copsense.stand(icub.robot, contacts, icub.q)
+    stance = copsense.robots.stand(icub.robot, contacts, icub.q)
     with pytest.raises(InfeasibleError) as caught:
         solve(stance, Limits(cop_margin=None))
     assert all("slips" in name for name in caught.value.demands)
@@ -64,7 +64,7 @@ def test_no_friction_on_a_slope(icub, stance_of):
     for stance, tilt in ((icub, 0.05), (stance_of("solo12"), 0.05)):
         slope = Plane((0, 0, 0), (0.0, np.sin(tilt), np.cos(tilt)))
         contacts = [replace(c, plane=slope, friction=0.0) for c in stance.contacts]
-        tilted = copsense.stand(stance.robot, contacts, stance.q)
+        tilted = copsense.robots.stand(stance.robot, contacts, stance.q)
         with pytest.raises(InfeasibleError) as caught:
             solve(tilted, Limits(cop_margin=None))
         assert caught.value.violation > 0
@@ -77,7 +77,7 @@ def test_no_friction_on_slopes_that_lean_on_each_other(icub):
         replace(c, friction=0.0, plane=Plane((0, 0, 0), (0.0, -side * 0.2, 1.0)))
         for c, side in zip(icub.contacts, (1, -1), strict=True)
     ]
-    stance = copsense.stand(icub.robot, contacts, icub.q)
+    stance = copsense.robots.stand(icub.robot, contacts, icub.q)
     found = solve(stance, Limits(cop_margin=None))
     assert np.abs(found.wrenches[:, :2]).max() < 1e-10 * icub.robot.weight
     assert found.residual() < 1e-9 * icub.robot.weight

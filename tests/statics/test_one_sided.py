@@ -52,11 +52,11 @@ def compare(stance, y, criterion, limits, tolerance=1e-6):
     """CoP slopes before and after y, checked against one-sided differences."""
     here, tangent = lateral(stance, y, stance.q)
     found = copsense.cop_sensitivity(here, criterion, limits)
-    slopes = [side[:, 1] for side in found.one_sided(tangent)]
+    slopes = [found.one_sided(tangent, side=s)[:, 1] for s in (-1, 1)]
     for exact, numeric in zip(slopes, both_sides(stance, y, cop_y(criterion, limits)), strict=True):
         np.testing.assert_allclose(exact, numeric, rtol=tolerance, atol=tolerance)
     # Counting the coordinate the other way swaps and turns the sides.
-    turned = [side[:, 1] for side in found.one_sided(tangent, -1.0)]
+    turned = [found.one_sided(tangent, side=s, rate=-1.0)[:, 1] for s in (-1, 1)]
     np.testing.assert_allclose(turned, [-slopes[1], -slopes[0]], rtol=1e-12, atol=1e-12)
     return found.equilibrium, slopes
 
@@ -149,7 +149,7 @@ def test_icubs_first_activation(icub, criterion, printed, side):
         at, _ = lateral(icub, y, icub.q)
         found = copsense.solve_equilibrium(at, criterion)
         return min(
-            copsense.Polygon(c.polygon).margin(p).distance
+            copsense.polygon.Polygon(c.polygon).margin(p).distance
             for c, p in zip(at.contacts, contact_cops(found), strict=True)
         )
 
@@ -182,7 +182,7 @@ def test_saturated_cop_has_no_slope_along_the_edges_normal(icub):
             assert pressing
             held = 0
             for k, contact in enumerate(here.contacts):
-                margin = copsense.Polygon(contact.polygon).margin(found.cop[k])
+                margin = copsense.polygon.Polygon(contact.polygon).margin(found.cop[k])
                 if margin.distance < 1e-10:
                     assert np.abs(margin.normal @ found.matrix[k]).max() < 1e-9
                     held += 1

@@ -14,7 +14,9 @@ def along(stance, value, directions, *, step=STEP):
     """
     columns = []
     for direction in np.asarray(directions).T:
-        at = {k: value(copsense.retract(stance, k * step * direction)) for k in (-2, -1, 1, 2)}
+        at = {
+            k: value(copsense.posture.retract(stance, k * step * direction)) for k in (-2, -1, 1, 2)
+        }
         columns.append((8 * (at[1] - at[-1]) - (at[2] - at[-2])) / (12 * step))
     return np.stack(columns, axis=-1)
 
@@ -41,7 +43,7 @@ def relative(given, expected):
 def outcome(stance, criterion):
     """Everything that a criterion decides at a stance: CoPs, wrenches and torques, end to end."""
     found = copsense.solve_equilibrium(stance, criterion)
-    cops = copsense.contact_cops(found)
+    cops = copsense.cop.contact_cops(found)
     return np.concatenate([cops.ravel(), found.wrenches.ravel(), found.torques])
 
 

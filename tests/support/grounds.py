@@ -12,7 +12,7 @@ def off_centre(stance, seed=0, size=0.05):
     """A nearby posture without symmetry, the contacts in place."""
     Z = stance.admissible_motions
     coordinates = size * np.random.default_rng(seed).standard_normal(Z.shape[1])
-    return copsense.retract(stance, Z @ coordinates)
+    return copsense.posture.retract(stance, Z @ coordinates)
 
 
 def on_tilted_planes(stance, *, tilt, step, seed=0):
@@ -31,7 +31,7 @@ def on_tilted_planes(stance, *, tilt, step, seed=0):
         slope = rng.uniform(-tilt, tilt, 2)
         plane = Plane((x, y, rng.uniform(0, step)), (slope[0], slope[1], 1.0))
         contacts.append(replace(contact, plane=plane))
-    return copsense.stand(stance.robot, contacts, stance.q)
+    return copsense.robots.stand(stance.robot, contacts, stance.q)
 
 
 def with_hand(stance, frame, normal):

@@ -21,7 +21,7 @@ def postures(stance, count, *, seed=0, size=0.2):
     Z, found = stance.admissible_motions, []
     while len(found) < count:
         try:
-            moved = copsense.retract(stance, Z @ (size * rng.standard_normal(Z.shape[1])))
+            moved = copsense.posture.retract(stance, Z @ (size * rng.standard_normal(Z.shape[1])))
             found.append(stance.at(moved.q).q)
         except copsense.CopsenseError:
             continue

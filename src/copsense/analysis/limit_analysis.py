@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from copsense.binding import LimitChange, next_change
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
-from copsense.margins import LimitMargin, Travel, limit_margins, limit_travel
+from copsense.margins import LimitMargin, limit_margins
+from copsense.path import LateralPath
+from copsense.scan import PathScan, Travel
 from copsense.sensitivity import CopSensitivity
-from copsense.stance import Stance
 from copsense.statics import ActiveLimit, ActiveSetChange, ConstrainedEquilibrium
 
 SIDES = {"+y": 1, "-y": -1}  # to which the CoM may go, world axes
@@ -39,7 +39,7 @@ class LimitAnalysis:
     active: tuple[ActiveLimit, ...]
     optimality: float
     margins: tuple[LimitMargin, ...]
-    next_changes: Mapping[str, tuple[ActiveSetChange | None, LimitChange | None]]
+    next_changes: Mapping[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]
     travels: Mapping[str, Travel]
 
     @property
@@ -65,7 +65,7 @@ class LimitAnalysis:
                     },
                     "exact": None
                     if exact is None
-                    else {"name": exact.limit, "binds": exact.binds, "travel": exact.travel},
+                    else {"name": exact.name, "binds": exact.binds, "travel": exact.travel},
                 }
                 for side, (first, exact) in self.next_changes.items()
             },
@@ -86,7 +86,7 @@ class LimitAnalysis:
 
 
 def analyse_limits(
-    stance: Stance,
+    path: LateralPath,
     criterion: Criterion,
     limits: Limits,
     found: CopSensitivity,
@@ -95,7 +95,7 @@ def analyse_limits(
     """How one criterion stands with the limits at a posture.
 
     Args:
-        stance: the posture.
+        path: the CoM's lateral path through the posture; criteria share it.
         criterion: what shares the load.
         limits: what the wrenches and torques respect.
         found: the sensitivity of the criterion there, within the limits.
@@ -103,27 +103,23 @@ def analyse_limits(
     """
     equilibrium = found.equilibrium
     assert isinstance(equilibrium, ConstrainedEquilibrium)
+    own = PathScan(path, criterion)
     return LimitAnalysis(
         tuple(equilibrium.active),
         equilibrium.optimality(),
         limit_margins(equilibrium, limits),
-        _next_changes(stance, criterion, limits, found, tangent),
-        {side: limit_travel(stance, criterion, limits, way) for side, way in SIDES.items()},
+        _next_changes(PathScan(path, criterion, limits), found, tangent),
+        {side: own.travel(limits, way) for side, way in SIDES.items()},
     )
 
 
 def _next_changes(
-    stance: Stance,
-    criterion: Criterion,
-    limits: Limits,
-    found: CopSensitivity,
-    tangent: Float[np.ndarray, " nv"],
-) -> dict[str, tuple[ActiveSetChange | None, LimitChange | None]]:
+    scan: PathScan, found: CopSensitivity, tangent: Float[np.ndarray, " nv"]
+) -> dict[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]:
     """The next change of the active limits to either side; nothing where none can be told."""
     try:
-        back, forth = found.active_set_changes(tangent)
         return {
-            side: (forth if way > 0 else back, next_change(stance, criterion, limits, way))
+            side: (found.next_active_set_change(way * tangent), scan.next_active_set_change(way))
             for side, way in SIDES.items()
         }
     except CopsenseError:

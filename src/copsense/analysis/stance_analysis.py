@@ -18,6 +18,7 @@ from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
 from copsense.limits import Limits, torque_placeholders
+from copsense.path import LateralPath
 from copsense.posture import solve_posture
 from copsense.robots import sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
@@ -224,9 +225,10 @@ def analyse(
                 check_sensitivity(here, criterion, within)
     limited = {}
     if within is not None:
+        path = LateralPath(here)  # its postures serve every criterion
         for name, criterion in chosen.items():
             assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
-            limited[name] = analyse_limits(here, criterion, within, found[name], tangent)
+            limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
     notes = (*_limit_notes(here, within, limited), *sole_notes(here), *_joint_notes(here))
     return Analysis(here, tangent, found, within, limited, along, notes, check)
 

@@ -212,7 +212,7 @@ def _feet(stance: Stance, turns: list[np.ndarray], edges: list[np.ndarray]) -> F
     first, unknowns = np.full(nc, -1, dtype=np.int64), 3 if held == 3 else 0
     for k in order[held:]:
         first[k], unknowns = unknowns, unknowns + (3 if point[k] else 6)
-    support, group, member, anchor = _supports(stance, body)
+    support, group, member, anchor = _supports(stance)
     ends = np.cumsum([0] + [len(e) for e in edges])
     return Feet(
         body,
@@ -235,7 +235,7 @@ def _feet(stance: Stance, turns: list[np.ndarray], edges: list[np.ndarray]) -> F
     )
 
 
-def _supports(stance: Stance, body: np.ndarray) -> tuple[np.ndarray, ...]:
+def _supports(stance: Stance) -> tuple[np.ndarray, ...]:
     """Support joints, their groups, the groups' contacts, and every body's anchor."""
     model = stance.robot.model
     n = model.njoints - 2
@@ -245,7 +245,7 @@ def _supports(stance: Stance, body: np.ndarray) -> tuple[np.ndarray, ...]:
             holds[joint - 1].append(k)
     support = [i for i in range(1, n + 1) if holds[i]]
     sets = sorted({tuple(holds[i]) for i in support})
-    member = np.zeros((len(sets), len(body)), dtype=np.int64)
+    member = np.zeros((len(sets), len(stance.contacts)), dtype=np.int64)
     for g, contacts in enumerate(sets):
         member[g, list(contacts)] = 1
     anchor = np.full(n + 1, -1, dtype=np.int64)

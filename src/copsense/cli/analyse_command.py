@@ -10,9 +10,9 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written
-from copsense.cli.quantities import LENGTH, read_positions
 from copsense.cli.region_text import region_data, region_lines, save_regions
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import LENGTH, read_positions
 from copsense.errors import InvalidInputError
 
 

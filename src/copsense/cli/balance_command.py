@@ -32,6 +32,8 @@ from copsense.errors import InvalidInputError
 if TYPE_CHECKING:
     from copsense.simulation import Recording
 
+_TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure may go farther
+
 
 @click.command(
     epilog="\b\nExamples:\n"
@@ -217,6 +219,12 @@ def _summary(recording: Recording) -> dict[str, Any]:
             "excursion": attributes.get("static_excursion", math.nan),
             "contact": attributes.get("static_contact", ""),
             "how": attributes.get("static_how", ""),
+            "reach": attributes.get("static_reach", math.nan),
+            "statement": attributes.get("static_statement", ""),
+        },
+        "quasi_static": {
+            name: attributes.get(f"quasi_static_{name}", math.nan)
+            for name in ("lever", "excess", "share", "frequency")
         },
     }
 
@@ -245,8 +253,12 @@ def _print(summary: dict[str, Any]) -> None:
         )
     else:
         click.echo("  no contact tipped")
-    if math.isfinite(static["excursion"]):
+    if static["statement"]:
+        click.echo(f"  static prediction: {static['statement']}")
+    quasi = summary["quasi_static"]
+    if quasi["share"] > _TOO_FAST:
         click.echo(
-            f"  static prediction: {static['contact']} {static['how']} at "
-            f"{static['excursion'] * 1e3:.1f} mm"
+            f"  too fast for statics: in motion the centre of pressure goes up to "
+            f"{quasi['excess'] * 1e3:.1f} mm ({quasi['share'] * 100:.0f} %) farther than the CoM. "
+            f"Statics are right within {_TOO_FAST * 100:.0f} % up to {quasi['frequency']:.2f} Hz"
         )

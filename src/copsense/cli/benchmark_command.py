@@ -16,7 +16,7 @@ import click
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written
-from copsense.cli.quantities import Unit, read_quantity
+from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, MissingExtraError
 
 if TYPE_CHECKING:

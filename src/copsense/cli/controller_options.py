@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.quantities import read_assignments
+from copsense.cli.units import read_assignments
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:

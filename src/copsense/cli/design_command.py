@@ -9,8 +9,8 @@ import click
 
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
-from copsense.cli.quantities import read_range
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import read_range
 from copsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -105,7 +105,9 @@ def design(
                 "family": family,
                 "objective": objective,
                 "best": asdict(found.score),
+                "at_bound": list(found.at_bound),
                 "baselines": [asdict(s) for s in found.baselines],
+                "alternatives": [asdict(s) for s in found.alternatives],
                 "pareto": [asdict(s) for s in found.pareto],
             }
         )
@@ -123,8 +125,15 @@ def _print(robot: str, found: Design) -> None:
     click.echo("criterion         travel [mm]  worst gain  torque norm [N m]  first limit")
     for row in (*found.baselines, found.score):
         click.echo(_line(row))
+    for row in found.alternatives:
+        chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
+        click.echo(_line(row) + f"  best of family length: {chosen}")
     chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
     click.echo(f"\nbest: {chosen}; {_gained(found)}")
+    if found.at_bound:
+        click.echo(
+            f"at a bound of the family: {', '.join(found.at_bound)}; beyond it may be better still"
+        )
     reach = found.score.range * 1e3
     click.echo(
         "worst gain: the largest |dCoP/dCoM| of any contact; it and the torque norm (rms) are over "

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.quantities import read_assignments
+from copsense.cli.units import read_assignments
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:

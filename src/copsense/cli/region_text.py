@@ -22,7 +22,7 @@ def save_regions(
     picture: str,
     *,
     overwrite: bool,
-) -> dict[str, ComRegion]:
+) -> Mapping[str, ComRegion]:
     """Draw the regions that limits leave, with the soles and the lateral path, and return them."""
     from copsense.path import lateral_sweep
     from copsense.plots import plot_regions, save_figure

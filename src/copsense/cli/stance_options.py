@@ -9,7 +9,7 @@ import click
 
 from copsense.cli.limit_options import limits_option
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.quantities import ANGLE, LENGTH, read_positions, read_quantity
+from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:

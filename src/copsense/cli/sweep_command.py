@@ -12,8 +12,8 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import echo_json, echo_written, progress_bar
-from copsense.cli.quantities import read_range
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import read_range
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ from copsense.comparison.benchmark_run import run_benchmark, run_case
 from copsense.comparison.case import Case, make_plan
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
 from copsense.comparison.plan_file import read_plan
-from copsense.comparison.prediction import predict_impulse
 from copsense.comparison.ranking import CAVEAT, agreement, rank_controllers, rank_scores
 from copsense.comparison.score import Score
 from copsense.comparison.score_kinds import SCORES, ScoreKind, shown_unit
 from copsense.comparison.table import load_benchmark
 from copsense.comparison.trials import Breaking, Falls, Lean, PushToTip, Rest, Sway, Trial
+from copsense.simulation.prediction import predict_impulse
 
 __all__ = [
     "CAVEAT",

@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, Literal
 
 from copsense.comparison.case import Case
-from copsense.comparison.prediction import Statics, statics
 from copsense.controllers import (
     BalancingController,
     Controller,
@@ -20,6 +19,7 @@ from copsense.controllers import (
 )
 from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
 from copsense.simulation import MujocoSimulator, Push, Recording, Scenario, rollout
+from copsense.simulation.prediction import StaticPrediction, predict
 from copsense.stance import Stance
 
 _SHORTER = 0.85  # a lean out of reach is tried again, so much shorter
@@ -113,10 +113,10 @@ class CaseRunner:
         """The lateral reference of a signal."""
         return lateral_reference(self.stance, signal)
 
-    def statics(self, reference: PathReference) -> tuple[Statics | None, str]:
+    def statics(self, reference: PathReference) -> tuple[StaticPrediction | None, str]:
         """What the statics say along a reference; or nothing, and why."""
         try:
-            return statics(reference, self.criterion, self.limits, self._friction), ""
+            return predict(reference, self.criterion, self.limits, self._friction), ""
         except CopsenseError as error:
             return None, f"no static prediction: {error}"
 
@@ -135,8 +135,7 @@ class CaseRunner:
         model, names = self.stance.robot.model, set(self.stance.robot.torque_names)
         found: dict[str, None] = {}
         for contact in self.stance.contacts:
-            joint = model.frames[model.getFrameId(contact.frame)].parentJoint
-            for i in model.supports[joint]:
+            for i in self.stance.limb(contact):
                 if model.names[i] in names:
                     found[model.names[i]] = None
         return tuple(found)

@@ -12,12 +12,12 @@ import numpy as np
 
 from copsense.comparison.bisection import Bracket, bisect
 from copsense.comparison.case_runner import CaseRunner
-from copsense.comparison.prediction import predict_impulse
 from copsense.comparison.score import Score, failed
 from copsense.comparison.score_kinds import SCORES
 from copsense.comparison.trials import Breaking, Falls, Lean, PushToTip, Rest, Sway
 from copsense.controllers import Hold, Sine
 from copsense.simulation import Motors, Noise, Push, Recording
+from copsense.simulation.prediction import predict_impulse
 from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push

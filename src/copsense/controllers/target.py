@@ -7,7 +7,7 @@ A signal (`Hold`, `Sine`, `Ramp`) says how far along a path the robot should be 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -78,6 +78,11 @@ class Hold:
         """Least and greatest value."""
         return self.value, self.value
 
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class Sine:
@@ -106,6 +111,11 @@ class Sine:
     def extent(self) -> tuple[float, float]:
         """Least and greatest value."""
         return -abs(self.amplitude), abs(self.amplitude)
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return abs(self.amplitude) * (2 * math.pi * self.frequency) ** 2
 
 
 @dataclass(frozen=True)
@@ -154,6 +164,11 @@ class Ramp:
     def extent(self) -> tuple[float, float]:
         """Least and greatest value."""
         return min(0.0, self.distance), max(0.0, self.distance)
+
+    @property
+    def peak_acceleration(self) -> float:
+        """Largest second derivative [m/s^2]."""
+        return self.speed / self.rounding if self.distance else 0.0
 
 
 class PathReference:
@@ -256,4 +271,4 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
             if i in few.failures:
                 raise UnreachablePostureError(few.failures[i])
     path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
-    return PathReference(replace(path, values=path.values - start, coordinate="com_y"), signal)
+    return PathReference(path.shifted(-start), signal)

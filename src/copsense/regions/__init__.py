@@ -7,8 +7,9 @@ Three nested convex sets of horizontal CoM positions c:
 * the criterion's own wrenches stay within all of them, with no QP to clip them:
   `criterion_region`.
 
-All three hold the contacts' Jacobian J and the gravity torques G_j of the joints at the stance's
-posture, as [Bretl2008] and [Orsolino2020] do, and move the weight's line of action alone:
+`com_regions` gives them all. They hold the contacts' Jacobian J and the gravity torques G_j of the
+joints at the stance's posture, as [Bretl2008] and [Orsolino2020] do, and move the weight's line of
+action alone:
 
     J_b' f = G_b(c) = G_b + S (c - c0),    S (c - c0) the moment of the weight moved by c - c0,
     A f <= b,    -t <= tau <= t,    tau = G_j - J_j' f.
@@ -17,7 +18,7 @@ That is exact for a load that shifts on the base's link. It is exact for every p
 contacts where torques take no part: friction and soles alone, and the minimum wrench, know only
 the contacts and the CoM. Torques do depend on the posture, so a robot that leans by itself meets
 other limits than one whose load shifts: ``criterion_region(..., moving=True)`` is the first order
-of that, and `copsense.margins.limit_travel` follows the posture exactly.
+of that, and `copsense.scan.limit_travel` follows the posture exactly.
 
 [Bretl2008] T. Bretl, S. Lall, "Testing Static Equilibrium for Legged Robots", IEEE Transactions on
 Robotics 24(4), 2008. [Orsolino2020] R. Orsolino et al., "Feasible Region: An Actuation-Aware
@@ -27,7 +28,7 @@ Extension of the Support Region", IEEE Transactions on Robotics 36(4), 2020.
 from __future__ import annotations
 
 from copsense.regions.feasible_region import FINEST, com_region
-from copsense.regions.nested_regions import com_regions
+from copsense.regions.nested_regions import ComRegions, com_regions
 from copsense.regions.region import BOX, ComRegion
 from copsense.regions.unclipped_region import criterion_region
 from copsense.regions.weight_line import gravity_at
@@ -36,6 +37,7 @@ __all__ = [
     "BOX",
     "FINEST",
     "ComRegion",
+    "ComRegions",
     "com_region",
     "com_regions",
     "criterion_region",

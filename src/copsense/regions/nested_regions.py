@@ -1,9 +1,12 @@
-"""com_regions: the regions that limits leave to the CoM, one inside the other."""
+"""Nested regions: what friction and soles, torque limits and each criterion leave to the CoM."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
 
 from copsense.criterion import Criterion
 from copsense.limits import Limits
@@ -12,23 +15,88 @@ from copsense.regions.region import ComRegion
 from copsense.regions.unclipped_region import criterion_region
 from copsense.stance import Stance
 
+SUPPORTED, ACTUATED = "friction and soles", "and torque limits"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComRegions(Mapping[str, ComRegion]):
+    """The regions of the CoM at one stance, the widest first; a mapping from name to region.
+
+    Its keys are ``"friction and soles"``, ``"and torque limits"`` where there are any, and the
+    criteria's names.
+
+    Attributes:
+        com: horizontal position (2,) of the stance's CoM, world x and y [m].
+        supported: an equilibrium exists within all but the torque limits.
+        actuated: one exists within the torque limits too; None without any.
+        unclipped: criterion -> where its own wrenches stay within all limits.
+    """
+
+    com: Float[np.ndarray, " 2"]
+    supported: ComRegion
+    actuated: ComRegion | None
+    unclipped: Mapping[str, ComRegion]
+
+    def __getitem__(self, name: str) -> ComRegion:
+        """The region of a name."""
+        return self._named[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names, the widest region first."""
+        return iter(self._named)
+
+    def __len__(self) -> int:
+        """How many regions there are."""
+        return len(self._named)
+
+    def __repr__(self) -> str:
+        """A line for each region: its area, and how far the CoM is inside."""
+        width = max(map(len, self))
+        lines = (
+            f"  {name:{width}}  {region!r}, the CoM {self.margins[name] * 1e3:+.1f} mm inside"
+            for name, region in self.items()
+        )
+        return "\n".join(["ComRegions:", *lines])
+
+    @property
+    def areas(self) -> dict[str, float]:
+        """Area of each region [m^2]."""
+        return {name: region.area for name, region in self.items()}
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """How far the stance's CoM is inside each region [m]; see `ComRegion.margin`."""
+        return {name: region.margin(self.com) for name, region in self.items()}
+
+    @property
+    def _named(self) -> dict[str, ComRegion]:
+        actuated = {} if self.actuated is None else {ACTUATED: self.actuated}
+        return {SUPPORTED: self.supported, **actuated, **self.unclipped}
+
 
 def com_regions(
-    stance: Stance, criteria: Sequence[Criterion], limits: Limits
-) -> dict[str, ComRegion]:
+    stance: Stance, criteria: Sequence[Criterion], limits: Limits, *, tolerance: float = 1e-4
+) -> ComRegions:
     """Where the CoM may be over the ground, contacts and joints held at a posture.
 
     Args:
         stance: the posture.
-        criteria: whose own wrenches are asked about.
+        criteria: whose own wrenches are asked about, each of another name.
         limits: what the wrenches and torques must respect.
+        tolerance: of `com_region` [m].
 
-    Returns:
-        ``"friction and soles"``: an equilibrium exists within all but the torque limits;
-        ``"and torque limits"``: within those too, where there are any; then each criterion's
-        name: its own wrenches stay within all of them.
+    Raises:
+        InfeasibleError: no equilibrium within the limits, wherever the CoM is.
+        UndeterminedWrenchError: a criterion leaves several wrenches equally good.
+        InvalidInputError: limits or weights that do not fit the stance.
+        UnknownNameError: a torque limit names no joint.
     """
-    regions = {"friction and soles": com_region(stance, replace(limits, torque=None))}
+    actuated = None
     if limits.torque is not None:
-        regions["and torque limits"] = com_region(stance, limits)
-    return regions | {c.name: criterion_region(stance, c, limits) for c in criteria}
+        actuated = com_region(stance, limits, tolerance=tolerance)
+    return ComRegions(
+        stance.com[:2],
+        com_region(stance, replace(limits, torque=None), tolerance=tolerance),
+        actuated,
+        {c.name: criterion_region(stance, c, limits) for c in criteria},
+    )

@@ -1,50 +1,113 @@
 """StaticPrediction: where the centres of pressure should be, and how far the robot may lean.
 
 The static analysis along the very path that a closed loop follows. It uses the criterion that the
-controller applies, so a comparison holds the theory against physics, not against another law.
+controller applies, so a comparison holds the theory against physics, not against another policy.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from copsense.contact import Contact
+from copsense.controllers import STIFF, Gains
 from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
-from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.limits import Limits
+from copsense.margins import MarginTable, margin_table
+from copsense.scan import PathScan, ScanPoint
 from copsense.simulation.physics_settings import PhysicsSettings
+from copsense.simulation.quasi_static import QuasiStatic, quasi_static
 from copsense.simulation.recording import Recording
 from copsense.stance import Stance
-from copsense.statics import solve_equilibrium
+
+# What keeps a contact in its place, but for friction, which is taken as a cone below.
+_GROUND = Limits(normal_force=0.0, friction=None, cop_margin=0.0, torsion=None)
+_TOUCHING = 1e-9  # share of the weight, or metres of it: what has so little left has nothing
+_CLOSING = 1e-12  # share of the weight per metre that is no approach
+_AFTER = 1.0  # s: the controller has answered a push by then
+_HOW = {"cop": "tips", "normal force": "lifts", "friction": "slips"}
 
 
 @dataclass(frozen=True, eq=False)
 class StaticPrediction:
-    """Static centres of pressure along a path.
+    """The statics along a path, and to first order from its start.
 
     Attributes:
         values: the path's coordinate, relative to the start (N,) [m].
         cops: centre of pressure of each contact (N, nc, 2), contact axes [m]; NaN where unloaded.
+        margins: smallest distance of a centre of pressure to its sole's edge (N,) [m]; infinite
+            without soles, NaN where a contact carries no load.
+        torques: joint torques (N, n) [Nm].
         joints: position of each joint (N, n) [rad, m].
         excursion: how far from the start the path's coordinate may go until a contact's CoP reaches
             an edge, its load is gone, or its force leaves the friction cone [m]; infinite where
             none does on this path.
         contact: the contact that does so first, or nothing.
         how: ``"tips"``, ``"lifts"`` or ``"slips"``, or nothing.
-        first_order: the same from wrenches and slopes at the start alone [m].
+        first_order: the same from wrenches and their derivatives at the start alone [m].
+        reach: how far the path goes to that side [m]: nothing is known beyond.
+        start: the equilibrium at the start, and its derivatives along the path.
+        quasi_static: how far the motion is from one that is slow enough for statics.
     """
 
     values: Float[np.ndarray, " N"]
     cops: Float[np.ndarray, "N nc 2"]
+    margins: Float[np.ndarray, " N"]
+    torques: Float[np.ndarray, "N n"]
     joints: Float[np.ndarray, "N n"]
     excursion: float
     contact: str
     how: str
     first_order: float
+    reach: float
+    start: ScanPoint
+    quasi_static: QuasiStatic
+
+    @property
+    def statement(self) -> str:
+        """What is predicted, in words; also where the path ends before anything happens."""
+        if not np.isfinite(self.excursion):
+            return f"none up to {self.reach * 1e3:.1f} mm"
+        return f"{self.contact} {self.how} at {self.excursion * 1e3:.1f} mm"
+
+    def smallest_margin(self, low: float, high: float) -> tuple[float, float]:
+        """Smallest margin for the coordinate between two values [m].
+
+        Returns:
+            On the path, and to first order: by forces that are linear in the coordinate.
+        """
+        known = ~np.isnan(self.margins)
+        y = np.linspace(low, high, 401)
+        path = float(np.interp(y, self.values[known], self.margins[known]).min())
+        # A ratio of linear functions is monotonic: its least is at an end.
+        ends = np.array([[low], [high]])
+        forces = self.start.forces + ends * self.start.force_rates
+        torques = self.start.torques + ends * self.start.torque_rates
+        margins = self._table.values(forces, torques)[:, self._edges]
+        return path, float(margins.min(initial=np.inf))
+
+    def torque_norm(self, y: Float[np.ndarray, " k"]) -> tuple[float, float]:
+        """Mean norm of the torques over values of the coordinate [Nm]: on the path, first order."""
+        norms = np.linalg.norm(self.torques, axis=1)
+        first = np.linalg.norm(self._first_torques(y), axis=1)
+        return float(np.interp(y, self.values, norms).mean()), float(first.mean())
+
+    def torque_peak(
+        self, y: Float[np.ndarray, " k"], joints: list[int] | None = None
+    ) -> tuple[float, float]:
+        """Largest torque over values of the coordinate [Nm]: on the path, and to first order.
+
+        Args:
+            y: values of the coordinate [m].
+            joints: which joints to look at; default all.
+        """
+        at = list(range(self.torques.shape[1])) if joints is None else joints
+        peaks = np.abs(self.torques[:, at]).max(axis=1)
+        first = np.abs(self._first_torques(y)[:, at]).max()
+        return float(np.interp(y, self.values, peaks).max()), float(first)
 
     def attach(self, recording: Recording) -> Recording:
         """A recording with this prediction beside it, over a dimension of its own."""
@@ -67,7 +130,24 @@ class StaticPrediction:
             static_contact=self.contact,
             static_how=self.how,
             static_first_order=self.first_order,
+            static_reach=self.reach,
+            static_statement=self.statement,
+            quasi_static_lever=self.quasi_static.lever,
+            quasi_static_excess=self.quasi_static.excess,
+            quasi_static_share=self.quasi_static.share,
+            quasi_static_frequency=self.quasi_static.frequency,
         )
+
+    def _first_torques(self, y: np.ndarray) -> np.ndarray:
+        return self.start.torques + np.outer(y, self.start.torque_rates)
+
+    @cached_property
+    def _table(self) -> MarginTable:
+        return margin_table(self.start.stance, _GROUND)
+
+    @property
+    def _edges(self) -> np.ndarray:
+        return np.flatnonzero([kind == "cop" for kind in self._table.kinds])
 
 
 def predict(
@@ -78,57 +158,54 @@ def predict(
 ) -> StaticPrediction:
     """The static prediction along a reference's path, from its start at zero outwards.
 
-    The excursion is linear between the path's postures, which a lateral reference has every 2 mm.
-
     Args:
         reference: the path, and to which side it goes first.
         criterion: how the load is shared.
         limits: within which, if any.
         friction: coefficient of contacts that give none.
+
+    Raises:
+        CopsenseError: no equilibrium somewhere on the path, such as beyond the limits.
     """
-    path, nc = reference.path, len(reference.path.stances[0].contacts)
-    cops, forces = np.full((len(path), nc, 2), np.nan), np.full((len(path), nc, 3), np.nan)
-    for i, here in enumerate(path.stances):
-        if i not in path.failures:
-            equilibrium = solve_equilibrium(here, criterion, limits)
-            forces[i] = equilibrium.wrenches[:, :3] / here.robot.weight
-            if not equilibrium.unloaded:
-                cops[i] = contact_cops(equilibrium)
+    path, side = reference.path, farther_side(reference.signal)
+    scan = PathScan(path, criterion, limits, start=0.0)
+    start = scan.begin
+    gaps = _Gaps(start.stance, friction)
+    # Limits may hold a centre of pressure on the very edge, within rounding.
+    touching = 0.0 if limits is None else _TOUCHING
+    found = scan.first(lambda point: gaps.rates(point, touching), side)
+    left, rates = gaps.rates(start)
+    closing = -side * rates
+    first = np.where(closing > _CLOSING * gaps.weight, left, np.inf)
+    first = np.where(left > 0, first / np.where(np.isfinite(first), closing, 1.0), 0.0)
+
     values = np.asarray(path.values, dtype=float)
-    margins = [
-        # Crossings of zero alone are looked for, so shares of the weight stand beside distances.
-        np.column_stack(
-            [_edge_distances(path.stances[0], cops[:, k], k), force_gaps(contact, f, friction)]
-        )
-        for k, (contact, f) in enumerate(
-            zip(path.stances[0].contacts, forces.swapaxes(0, 1), strict=True)
-        )
-    ]
-    side = farther_side(reference.signal)
-    middle = int(np.argmin(np.abs(values)))
-    order = np.arange(middle, len(values)) if side > 0 else np.arange(middle, -1, -1)
-    travel = side * values[order]  # the path's postures need not include the very start
-    excursion, contact, how, first_order = np.inf, "", "", np.inf
-    for k, distances in enumerate(margins):
-        ways = ["tips"] * (distances.shape[1] - 2) + ["lifts", "slips"]
-        for way, edge in zip(ways, distances[order].T, strict=True):
-            if len(travel) > 1 and edge[1] < edge[0] - 1e-12:
-                part = edge[0] / (edge[0] - edge[1])
-                first_order = min(first_order, travel[0] + part * (travel[1] - travel[0]))
-            beyond = np.flatnonzero(edge <= 0)
-            if len(beyond):
-                i = int(beyond[0])
-                at = 0.0
-                if i:
-                    part = edge[i - 1] / (edge[i - 1] - edge[i])
-                    at = float(travel[i - 1] + part * (travel[i] - travel[i - 1]))
-                if at < excursion:
-                    excursion, contact, how = at, path.stances[0].contact_names[k], way
-    robot = path.stances[0].robot
+    shape = len(values), len(start.stance.contacts)
+    cops, margins = np.full((*shape, 2), np.nan), np.full(len(values), np.nan)
+    torques = np.full((len(values), len(start.torques)), np.nan)
+    for i, value in enumerate(values):
+        if i not in path.failures:
+            point = scan.at(float(value))
+            cops[i], torques[i] = _cops(point), point.torques
+            margins[i] = gaps.margin(point)
+    robot = start.stance.robot
     joints = np.array(
         [[robot.joint_position(s.q, joint) for joint in robot.joint_names] for s in path.stances]
     )
-    return StaticPrediction(values, cops, joints, excursion, contact, how, float(first_order))
+    return StaticPrediction(
+        values,
+        cops,
+        margins,
+        torques,
+        joints,
+        np.inf if found is None else found.travel,
+        "" if found is None else gaps.contacts[found.row],
+        "" if found is None else _HOW[gaps.kinds[found.row]],
+        float(first.min(initial=np.inf)),
+        float(max(side * values.max() if side > 0 else -values.min(), 0.0)),
+        start,
+        quasi_static(start.stance, start.tangent, reference.signal),
+    )
 
 
 def predict_lean(
@@ -138,30 +215,90 @@ def predict_lean(
     return predict(lateral_reference(stance, Ramp(reach)), criterion, limits)
 
 
-def farther_side(signal: Signal) -> float:
+def predict_impulse(
+    stance: Stance, excursion: float, duration: float, gains: Gains = STIFF
+) -> float:
+    """The least lateral push that tips a contact, by the static excursion and no fitted number.
+
+    The CoM is a mass m under the controller's policy, a = -kp y - kd v + F/m, and acts on the soles
+    as if it stood at rest at y + (h/g)(kp y + kd v): there is where the static analysis is asked.
+
+    Args:
+        stance: gives mass and height of the CoM.
+        excursion: the static excursion d to the first tip [m].
+        duration: of the push [s].
+        gains: their lateral kp and kd.
+
+    Returns:
+        The impulse F * duration [N s].
+    """
+    kp, kd = gains.com_stiffness[1], gains.com_damping[1]
+    ground = float(np.mean([place.translation[2] for place in stance.placements]))
+    g = stance.robot.weight / stance.robot.mass
+    lever = (float(stance.com[2]) - ground) / g
+    dt = 1e-4
+    y = v = most = 0.0
+    for i in range(round((duration + _AFTER) / dt)):
+        # Of a unit impulse.
+        push = 1.0 / (stance.robot.mass * duration) if i * dt < duration else 0.0
+        v += dt * (push - kp * y - kd * v)
+        y += dt * v
+        most = max(most, y + lever * (kp * y + kd * v))
+    return excursion / most
+
+
+def farther_side(signal: Signal) -> int:
     """To which side a signal goes farther, 1 or -1; as a sine goes as far to both, first."""
     low, high = signal.extent
     if high == -low:
-        return -1.0 if signal.at(0.0)[1] < 0 else 1.0
-    return 1.0 if high > -low else -1.0
+        return -1 if signal.at(0.0)[1] < 0 else 1
+    return 1 if high > -low else -1
 
 
-def force_gaps(
-    contact: Contact, forces: Float[np.ndarray, "N 3"], friction: float
-) -> Float[np.ndarray, "N 2"]:
-    """Normal force, and what the friction cone has left; a contact keeps its place above zero.
+class _Gaps:
+    """What the contacts of a stance have left before one tips, lifts or slips.
 
-    Args:
-        contact: gives the coefficient, if it has one.
-        forces: in contact axes, in any unit.
-        friction: the coefficient otherwise.
+    Attributes:
+        contacts: name of the contact of each gap (r,).
+        kinds: ``"cop"``, ``"normal force"`` or ``"friction"`` (r,).
+        weight: of the robot [N].
     """
-    mu = friction if contact.friction is None else contact.friction
-    tangential = np.hypot(forces[:, 0], forces[:, 1])
-    return np.column_stack([forces[:, 2], mu * forces[:, 2] - tangential])
+
+    def __init__(self, stance: Stance, friction: float) -> None:
+        """Lay the gaps of these contacts out."""
+        self.table, self.weight = margin_table(stance, _GROUND), stance.robot.weight
+        self.friction = [friction if c.friction is None else c.friction for c in stance.contacts]
+        self.contacts = (*self.table.where, *stance.contact_names)
+        self.kinds = (*self.table.kinds, *("friction" for _ in stance.contacts))
+
+    def rates(self, point: ScanPoint, touching: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """The gaps [N, Nm], less a share of the weight, and their derivatives along the path.
+
+        Tips and lifts by the slack of their rows, slips by mu f_z - |f_t|.
+        """
+        wrenches = point.stance.unstack(point.forces)
+        changes = point.stance.unstack(point.force_rates)
+        gaps, rates = [], []
+        for mu, force, change in zip(self.friction, wrenches, changes, strict=True):
+            size = float(np.hypot(*force[:2]))
+            # At rest in the plane a force begins to slip whichever way it goes.
+            sideways = force[:2] @ change[:2] / size if size else float(np.hypot(*change[:2]))
+            gaps.append(mu * force[2] - size)
+            rates.append(mu * change[2] - sideways)
+        left = np.concatenate([self.table.slack(point.forces, point.torques), gaps])
+        closing = self.table.slack_rates(point.force_rates, point.torque_rates)
+        return left - touching * self.weight, np.concatenate([closing, rates])
+
+    def margin(self, point: ScanPoint) -> float:
+        """Smallest distance of a centre of pressure to its sole's edge [m]."""
+        edges = np.flatnonzero([self.table.kinds[rows[0]] == "cop" for rows in self.table.groups])
+        margins = self.table.group_margins(point.forces, point.torques)[edges]
+        return float(margins.min(initial=np.inf))
 
 
-def _edge_distances(stance: Stance, cops: np.ndarray, k: int) -> np.ndarray:
-    """Distance of CoPs (N, 2) to each edge of a contact's sole (N, e); none for a point."""
-    sole = stance.contacts[k].sole
-    return sole.distances(cops) if sole else np.full((len(cops), 1), np.inf)
+def _cops(point: ScanPoint) -> Float[np.ndarray, "nc 2"]:
+    """Centre of pressure of each contact [m]; NaN where it carries no load."""
+    w = point.equilibrium.wrenches
+    loaded = np.array([n not in point.equilibrium.unloaded for n in point.stance.contact_names])
+    fz = np.where(loaded, w[:, 2], 1.0)
+    return np.where(loaded[:, None], np.column_stack([-w[:, 4], w[:, 3]]) / fz[:, None], np.nan)

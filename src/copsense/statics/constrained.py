@@ -67,21 +67,36 @@ class ActiveLimit:
         return self.multiplier == 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ActiveSetChange:
-    """The next limit to begin or cease to press along a motion, to first order.
+    """The next limit to begin or cease to press along a motion.
+
+    A prediction to first order from one posture has the first five; what a search along a path
+    finds (`copsense.scan.next_active_set_change`) has them all.
 
     Attributes:
+        criterion: the criterion's name.
         name: the limit's name.
         kind: as of `ActiveLimit`.
         binds: whether it begins to bind; False where it ceases to.
-        travel: how far along the motion, in units of it.
+        travel: how far along the motion, in units of it; of a path, of its coordinate.
+        first_order: of a search, the travel predicted where it began; infinite if no change was. It
+            may be another limit's.
+        value: of a search, the path's coordinate there, such as world y of the CoM [m].
+        before: d CoP / d coordinate of each contact just before the change (nc, 2), contact axes;
+            None where a contact carries no load there, and has no centre of pressure.
+        after: the same just after; None too where the limits leave no way forward.
     """
 
+    criterion: str
     name: str
     kind: str
     binds: bool
     travel: float
+    first_order: float = np.nan
+    value: float = np.nan
+    before: Float[np.ndarray, "nc 2"] | None = None
+    after: Float[np.ndarray, "nc 2"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,29 +185,24 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         """The one-sided derivative along an admissible motion: what happens when it begins."""
         return self._problem.rates(self, direction)
 
-    def next_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
+    def next_active_set_change(self, direction: Float[np.ndarray, " nv"]) -> ActiveSetChange | None:
         """The first change of the pressing limits along an admissible motion, to first order.
 
-        The ratio test: a limit off its bound closes in at the rate of its slack (a centre of
-        pressure at that of its distance to the edge), a pressing one eases at the rate of its
-        multiplier. What is only touched here has taken a side already. None if nothing closes in.
+        The ratio test: a limit off its bound closes in at the rate of its slack (of a centre of
+        pressure f_z (b - a p)), a pressing one eases at the rate of its multiplier. What is only
+        touched here has taken a side already. None if nothing closes in.
         """
         rates = self.rates(direction)
         strong, touching = self._problem.strong, self._problem.strong | self._problem.weak
-        slack, closing = self.slack, -rates.slack
-        # (s / f_z)' = (s' - (s / f_z) f_z') / f_z, here as the rate of s that has the same ratio.
-        normal = self._problem.normal
-        cop = np.flatnonzero(normal >= 0)
-        fz = normal[cop]
-        closing[cop] += slack[cop] * rates.forces[fz] / self.forces[fz]
-        left = np.where(touching, self.row_multipliers, slack)
-        closing = np.where(touching, -rates.multipliers, closing)
+        left = np.where(touching, self.row_multipliers, self.slack)
+        closing = -np.where(touching, rates.multipliers, rates.slack)
         nearer = (closing > _CLOSING * np.abs(left)) & (strong | ~touching)
         if not np.any(nearer):
             return None
         travel = np.where(nearer, left / np.where(nearer, closing, 1.0), np.inf)
         i = int(np.argmin(travel))
-        return ActiveSetChange(self.names[i], self.kinds[i], not strong[i], float(travel[i]))
+        name, kind, binds = self.names[i], self.kinds[i], not strong[i]
+        return ActiveSetChange(self._criterion.name, name, kind, binds, float(travel[i]))
 
     @property
     def _criterion(self) -> Criterion:
@@ -216,37 +226,37 @@ def solve_constrained(
         UnsolvedError: no solver found wrenches that meet the optimality conditions.
     """
     problem = _Problem(stance, criterion, limits)
-    f, nu, multipliers, slack = problem.solve()
-    return ConstrainedEquilibrium(
-        stance,
-        criterion,
-        f,
-        problem.load.torques(f),
-        nu,
-        limits,
-        problem.names,
-        problem.kinds,
-        slack,
-        multipliers,
-        _problem=problem,
-    )
+    return problem.equilibrium(limits, *problem.solve())
 
 
 def distance_to_change(
-    stance: Stance, criterion: Criterion, limits: Limits, pressing: Int[np.ndarray, " a"]
-) -> Float[np.ndarray, " r"]:
-    """How far each row is from changing sides if these rows press.
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    pressing: Int[np.ndarray, " a"],
+    tangent: Float[np.ndarray, " nv"],
+) -> tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]:
+    """How far each row is from changing sides if these rows press, and its rate along a motion.
 
     The slack of a row off its bound, in shares of the weight; the multiplier of one that presses,
     in shares of the cost's gradient. These rows are the criterion's choice as long as none is
-    negative.
+    negative. The rates are exact where a distance is zero: the shares are held.
     """
     problem = _Problem(stance, criterion, limits)
     optimum = problem.program.optimum(pressing)
-    distance = (problem.b - problem.A @ optimum.x) / (problem.weight * problem.scale)
-    gradient = max(float(np.abs(problem.H @ optimum.x - problem.g).max()), 1e-300)
-    distance[pressing] = (optimum.multipliers * problem.scale)[pressing] / gradient
-    return distance
+    multipliers = optimum.multipliers
+    slack = problem.b - problem.A.dot(optimum.x)
+    found = problem.equilibrium(limits, optimum.x, optimum.equality, multipliers, slack)
+    held = np.flatnonzero(multipliers)
+    _, _, _, bound = problem.rates_of_data(found, tangent[:, None])
+    df, _, dl = problem.differentiate(found, tangent[:, None], held)
+    distance = slack / (problem.weight * problem.scale)
+    rate = (bound - problem.A.dot(df))[:, 0] / (problem.weight * problem.scale)
+    gradient = max(float(np.abs(problem.H.dot(optimum.x) - problem.g).max()), 1e-300)
+    distance[pressing] = (multipliers * problem.scale)[pressing] / gradient
+    rate[pressing] = 0.0
+    rate[held] = dl[:, 0] * problem.scale[held] / gradient
+    return distance, rate
 
 
 class _Problem:
@@ -264,12 +274,6 @@ class _Problem:
         # A contact's row has no joint, and no sign.
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
-        # Row of the normal force under a centre of pressure; -1 for any other limit.
-        under = [
-            stance.rows[k].start + stance.contacts[k].normal_row if kind == "cop" else -1
-            for k, kind in zip(rows.contacts, rows.kinds, strict=True)
-        ]
-        self.normal = np.array(under + [-1] * len(rows.joint), dtype=int)
         self.names = rows.names + rows.torque_names
         self.kinds = rows.kinds + ("torque",) * len(rows.joint)
         E, e = load.base_map.T, load.base_wrench
@@ -278,7 +282,7 @@ class _Problem:
         self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Forces, multipliers of the statics and of the rows, slack."""
+        """Forces, multipliers of the base's balance and of the rows, slack."""
         program = self.program
         curvature = program.curvature
         if len(curvature) and curvature[0] <= _SINGULAR * curvature[-1]:
@@ -300,23 +304,46 @@ class _Problem:
         self.weak = touching & ~self.strong
         multipliers[~self.strong] = 0.0
         slack[self.strong] = 0.0
+        return f, found.equality, multipliers, slack
+
+    def equilibrium(
+        self,
+        limits: Limits,
+        f: np.ndarray,
+        base: np.ndarray,
+        multipliers: np.ndarray,
+        slack: np.ndarray,
+    ) -> ConstrainedEquilibrium:
+        """The equilibrium of these forces; `base` are the multipliers of the base's balance."""
         # Stationarity: J nu = W_f (f - f_ref) + A_c' l, with nu_j = W tau + s l.
         nu = np.zeros(self.nb + len(self.load.torque_offset))
-        nu[: self.nb] = found.equality
+        nu[: self.nb] = base
         nu[self.nb :] = self.W.dot(self.load.torques(f))
         torque = self.joint >= 0
         np.add.at(nu, self.nb + self.joint[torque], (self.sign * multipliers)[torque])
-        return f, nu, multipliers, slack
+        return ConstrainedEquilibrium(
+            self.stance,
+            self.criterion,
+            f,
+            self.load.torques(f),
+            nu,
+            limits,
+            self.names,
+            self.kinds,
+            slack,
+            multipliers,
+            _problem=self,
+        )
 
     def differentiate(
         self, at: ConstrainedEquilibrium, V: Float[np.ndarray, "nv p"], held: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows along V, with these rows held."""
-        base, joints, change, bound = self._rates_of_data(at, V)
+        base, joints, change, bound = self.rates_of_data(at, V)
         df, _, dl = self.program.hold(held, change, base, bound[held])
         return df, joints - self.load.joint_map.dot(df), dl
 
-    def _rates_of_data(
+    def rates_of_data(
         self, at: ConstrainedEquilibrium, V: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
@@ -340,7 +367,7 @@ class _Problem:
     def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
         """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
-        base, joints, c, bound = (x[:, 0] for x in self._rates_of_data(at, v[:, None]))
+        base, joints, c, bound = (x[:, 0] for x in self.rates_of_data(at, v[:, None]))
         E = np.hstack([self.load.base_map.T, self.A[strong].T])
         e = np.concatenate([base, bound[strong]])
         pressed = self.program.hold(strong, c, base, bound[strong])[0]

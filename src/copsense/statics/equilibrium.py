@@ -69,7 +69,7 @@ class StaticEquilibrium:
         """
         return self.stance.unstack(self.forces)
 
-    @property
+    @array_property
     def world_wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """The same wrenches in world axes, about the same points [N, Nm]."""
         return self.stance.in_world_axes(self.wrenches)

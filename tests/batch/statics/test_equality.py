@@ -54,7 +54,7 @@ def test_margins_are_the_edge_margins(case):
     stance = case("icub")
     found = evaluate_batch(stance, postures(stance, 5), served(stance), gains=False)
     for i, j, k in np.ndindex(found.margin.shape):
-        edge = copsense.Polygon(stance.contacts[k].polygon).margin(found.cops[i, j, k])
+        edge = copsense.polygon.Polygon(stance.contacts[k].polygon).margin(found.cops[i, j, k])
         assert found.margin[i, j, k] == pytest.approx(edge.distance, abs=1e-13)
     assert found.com_gain.size == found.com_travel.size == 0
 

@@ -152,7 +152,9 @@ def test_an_unloaded_contact_is_a_failed_row(icub):
 
     def share(s):
         return float(
-            kernel.evaluate(copsense.retract(icub, s * direction).q[None]).load_share[0, 0, 1]
+            kernel.evaluate(copsense.posture.retract(icub, s * direction).q[None]).load_share[
+                0, 0, 1
+            ]
         )
 
     start = share(low)
@@ -163,7 +165,7 @@ def test_an_unloaded_contact_is_a_failed_row(icub):
         if np.isnan(value):
             break
         low, high = (middle, high) if value * start > 0 else (low, middle)
-    found = kernel.evaluate(copsense.retract(icub, (low + high) / 2 * direction).q[None])
+    found = kernel.evaluate(copsense.posture.retract(icub, (low + high) / 2 * direction).q[None])
     assert "no normal force" in found.reasons[0, 0]
 
 

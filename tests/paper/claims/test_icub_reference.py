@@ -93,9 +93,9 @@ def test_both_cops_are_in_the_soles_up_to_the_printed_millimetre_and_not_beyond(
 ):
     def margin(y):
         (stance,) = copsense.lateral_sweep(icub, side * y, side * y, 1).stances
-        cops = copsense.contact_cops(copsense.solve_equilibrium(stance, CRITERIA[criterion]))
+        cops = copsense.cop.contact_cops(copsense.solve_equilibrium(stance, CRITERIA[criterion]))
         return min(
-            copsense.Polygon(contact.polygon).margin(cop).distance
+            copsense.polygon.Polygon(contact.polygon).margin(cop).distance
             for contact, cop in zip(stance.contacts, cops, strict=True)
         )
 
@@ -107,7 +107,7 @@ def test_contacts_at_the_soles_bottom_change_the_second_criterion_alone(criterio
     lowered = copsense.load_stance("icub", contact_at="sole")
     (stance,) = copsense.lateral_sweep(lowered, OVER_A_FOOT, OVER_A_FOOT, 1).stances
     found = copsense.solve_equilibrium(stance, CRITERIA[criterion])
-    assert copsense.contact_cops(found)[1, 1] == printed(off_foot)
+    assert copsense.cop.contact_cops(found)[1, 1] == printed(off_foot)
 
 
 def test_centre_of_mass_held_lower_gives_another_paths_numbers(icub):

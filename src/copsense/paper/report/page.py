@@ -9,7 +9,6 @@ from importlib.resources import files
 
 from jinja2 import Environment, StrictUndefined
 
-from copsense.binding import LimitChange
 from copsense.paper.claims import VERDICT_STANDARD, EvaluatedClaim, ReferenceValue, Verdict
 from copsense.paper.errata import EvaluatedErratum
 from copsense.paper.report.closed_loop_section import (
@@ -22,6 +21,7 @@ from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.typesetting import typeset
 from copsense.paper.report.words import commands, differs, limit_words, limits, summary
 from copsense.paper.reproduce import Reproduction
+from copsense.statics import ActiveSetChange
 
 _MARKS = {
     Verdict.HOLDS: ("holds", "✓", "hold"),
@@ -104,13 +104,13 @@ def number(value: float, unit: str = "1") -> str:
     return text if unit == "1" else f"{text} {unit}"
 
 
-def _binding(found: LimitChange) -> dict[str, str]:
+def _binding(found: ActiveSetChange) -> dict[str, str]:
     sides = {
         name: "none" if side is None else ", ".join(f"{slope:.3f}" for slope in side[:, 1] + 0.0)
         for name, side in (("before", found.before), ("after", found.after))
     }
-    where = f"{found.com_y * 1e3:+.2f} mm"
-    limit = found.limit if found.binds else f"{found.limit} lets go"
+    where = f"{found.value * 1e3:+.2f} mm"
+    limit = found.name if found.binds else f"{found.name} lets go"
     return {"criterion": found.criterion, "limit": limit, "com_y": where} | sides
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from copsense.binding import LimitChange
 from copsense.paper.claims.icub_sweep import TORQUE, WRENCH
 from copsense.paper.report.closed_loop_section import sway_figures
 from copsense.paper.report.paper_plots import (
@@ -27,6 +26,7 @@ from copsense.plots import (
     plot_torques,
 )
 from copsense.plots.style import Figure
+from copsense.statics import ActiveSetChange
 from copsense.sweeps import Sweep
 
 _CEILING = 30.0  # mm/deg: Fig. 5 has a pole
@@ -270,7 +270,7 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
     within = reproduction.within_limits
     binding: dict[str, list[float]] = {}
     for found in within.bindings:
-        binding.setdefault(found.criterion, []).append(found.com_y)
+        binding.setdefault(found.criterion, []).append(found.value)
     areas = {name: f"{region.area * 1e4:.0f} cm²" for name, region in within.regions.items()}
     torques = areas.get("and torque limits")
     return (
@@ -304,11 +304,11 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
     )
 
 
-def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
+def _binding_words(bindings: tuple[ActiveSetChange, ...]) -> str:
     """Where the first limit binds, and what happens there."""
     if not bindings:
         return "No other set of limits presses within reach."
-    first: dict[str, LimitChange] = {}
+    first: dict[str, ActiveSetChange] = {}
     for found in sorted(bindings, key=lambda b: b.travel):
         first.setdefault(found.criterion, found)
     said = " and ".join(f"{b.travel * 1e3:.1f} mm under {name}" for name, b in first.items())
@@ -318,7 +318,7 @@ def _binding_words(bindings: tuple[LimitChange, ...]) -> str:
             f"at a CoM travel of {said} (right: verticals)."
         )
     words = f"The first limit binds at a CoM travel of {said} (right: verticals)"
-    if all("CoP" in b.limit for b in bindings):
+    if all("CoP" in b.name for b in bindings):
         return (
             f"{words}: there the CoP stops at the sole's edge (left), its slope falls to nearly "
             "zero and the other foot's jumps up, because it has to carry what the first no longer "

@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from copsense.binding import LimitChange
 from copsense.limits import Limits
 from copsense.paper.claims import EvaluatedClaim, LateralSweep, ReferenceValue, Sway
 from copsense.paper.closed_form import FigureData, FourBar
 from copsense.paper.errata import EvaluatedErratum
 from copsense.regions import ComRegion
+from copsense.statics import ActiveSetChange
 from copsense.sweeps import Sweep
 
 
@@ -51,7 +51,7 @@ class WithinLimits:
 
     limits: Limits
     lateral: Sweep
-    bindings: tuple[LimitChange, ...]
+    bindings: tuple[ActiveSetChange, ...]
     regions: Mapping[str, ComRegion]
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from copsense.binding import next_change
 from copsense.limits import Limits
 from copsense.paper.reproduce.clock import Clock
 from copsense.paper.reproduce.reproduction import WithinLimits
 from copsense.paper.reproduce.sideways import paper_criteria
-from copsense.path import PosturePath
+from copsense.path import LateralPath, PosturePath
 from copsense.regions import com_region, criterion_region
+from copsense.scan import PathScan
 from copsense.stance import Stance
 from copsense.sweeps import sweep
 
@@ -23,10 +23,11 @@ def solve_within_limits(
     with clock.stage("limits: sensitivities", len(path)) as advance:
         dataset = sweep(path, criteria, limits, progress=advance)
     with clock.stage("limits: bindings and regions", len(criteria) * 2 + 2) as advance:
-        bindings = []
+        bindings, lateral = [], LateralPath(stance)
         for criterion in criteria:
+            scan = PathScan(lateral, criterion, limits)
             for side in (-1, 1):
-                found = next_change(stance, criterion, limits, side)
+                found = scan.next_active_set_change(side)
                 if found:
                     bindings.append(found)
                 advance(1)

@@ -74,7 +74,7 @@ def test_other_limits_replace_those_before(icub, tmp_path):
 
 def test_the_first_limit_is_marked_where_the_path_meets_it(icub):
     path = copsense.lateral_sweep(icub, -0.06, 0.06, 61)
-    exact = {c.name: copsense.limit_travel(icub, c, LIMITS).first.exact for c in CRITERIA}
+    exact = {c.name: copsense.scan.limit_travel(icub, c, LIMITS).first.exact for c in CRITERIA}
     for limits in (None, LIMITS):  # unclipped it is interpolated, clipped extrapolated
         found = copsense.sweep(path, CRITERIA, limits).with_limit_margins(LIMITS)
         for j, criterion in enumerate(CRITERIA):

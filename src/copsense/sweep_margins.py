@@ -1,12 +1,11 @@
-"""Recorded: how far the wrenches and torques of a sweep are from limits, without its robot."""
+"""Margins of a sweep: how far its wrenches and torques are from limits, without its robot."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Float
 
 from copsense.contact import Contact, Kind
@@ -14,6 +13,9 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits, rows_of
 from copsense.margins import UNITS, MarginTable
 from copsense.polygon import unpadded
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def with_limit_margins(dataset: xr.Dataset, limits: Limits) -> xr.Dataset:
@@ -35,17 +37,13 @@ def with_limit_margins(dataset: xr.Dataset, limits: Limits) -> xr.Dataset:
     contacts = _contacts(dataset)
     rows = rows_of(contacts, limits, *_torque_limits(dataset, limits))
     table = MarginTable(contacts, rows)
-    wrenches, torques = dataset["wrench"].values, dataset["torque"].values
-    margins = np.full((*wrenches.shape[:2], len(table.groups)), np.nan)
-    for i, j in np.argwhere(dataset["reason"].values == ""):
-        forces = np.concatenate(
-            [w[list(c.components)] for w, c in zip(wrenches[i, j], contacts, strict=True)]
-        )
-        with np.errstate(divide="ignore"):
-            values = table.values(forces, torques[i, j])
-        pulls = np.array([forces[fz] <= 0 for fz in table.row_fz], dtype=bool)
-        values[: len(pulls)][pulls & table.is_cop] = np.nan
-        margins[i, j] = [values[group].min() for group in table.groups]
+    # Wrenches (.., nc, 6) to stacked forces (.., m).
+    wrench = dataset["wrench"].values
+    forces = np.concatenate(
+        [wrench[..., k, list(c.components)] for k, c in enumerate(contacts)], axis=-1
+    )
+    margins = table.group_margins(forces, dataset["torque"].values)
+    margins[dataset["reason"].values != ""] = np.nan
     kinds = [table.kinds[group[0]] for group in table.groups]
     names = [f"{table.where[g[0]]}: {k}" for g, k in zip(table.groups, kinds, strict=True)]
     meaning = "signed distance to the limit, negative beyond; unit: limit_unit"

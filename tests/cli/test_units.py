@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 from support.commands import copsense
 
-from copsense.cli.quantities import read_positions, read_quantity, read_range
+from copsense.cli.units import read_positions, read_quantity, read_range
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
 

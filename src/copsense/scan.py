@@ -1,0 +1,520 @@
+"""PathScan: one criterion along a path, and where on the way something gives way first.
+
+Each posture is solved once, with the exact derivatives of forces and torques along the path. What
+is asked of a limit is asked of its slack b - A f: between two postures it is the cubic through the
+values and slopes at both, and its root is refined by solving the very posture where the path can
+give it. Postures are solved outwards from the start and only as far as the question needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float
+
+from copsense.cop import contact_cops
+from copsense.criterion import Criterion
+from copsense.errors import CopsenseError, InvalidInputError
+from copsense.limits import Limits
+from copsense.margins import LimitMargin, margin_table
+from copsense.path import LateralPath, PosturePath
+from copsense.roots import Track
+from copsense.sensitivity import CopSensitivity, cop_rates, cop_sensitivity, sensitivity_of
+from copsense.stance import Stance
+from copsense.statics import (
+    ActiveSetChange,
+    ConstrainedEquilibrium,
+    StaticEquilibrium,
+    distance_to_change,
+    solve_equilibrium,
+)
+
+_HERE = 1e-7  # of the coordinate: what changes nearer than this changes here
+_SAME = 1e-9  # of the coordinate: a posture so near to the start is the start
+_ROUNDING = 1e-9  # shares of the weight, or of the cost's gradient, by which nothing has changed
+_CLOSING = 1e-9  # share of a slack, per unit of the coordinate, that is no approach
+_PRECISION = 1e-9  # of a travel
+_CHANGE_PRECISION = 1e-12  # of a change: so near that the limit is only touched
+
+Measure = Callable[["ScanPoint"], tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]]
+
+
+@dataclass(frozen=True, eq=False)
+class ScanPoint:
+    """The equilibrium at one posture of a path, and its derivatives along the path.
+
+    Attributes:
+        value: the path's coordinate.
+        tangent: dq/dcoordinate (nv,).
+        equilibrium: the wrenches and torques there.
+    """
+
+    value: float
+    tangent: Float[np.ndarray, " nv"]
+    equilibrium: StaticEquilibrium
+
+    @property
+    def stance(self) -> Stance:
+        """The posture."""
+        return self.equilibrium.stance
+
+    @property
+    def forces(self) -> Float[np.ndarray, " m"]:
+        """Stacked contact forces, contact axes [N, Nm]."""
+        return self.equilibrium.forces
+
+    @property
+    def torques(self) -> Float[np.ndarray, " n"]:
+        """Joint torques [Nm]."""
+        return self.equilibrium.torques
+
+    @property
+    def force_rates(self) -> Float[np.ndarray, " m"]:
+        """d forces / d coordinate."""
+        return self._derivatives[0][:, 0]
+
+    @property
+    def torque_rates(self) -> Float[np.ndarray, " n"]:
+        """d torques / d coordinate."""
+        return self._derivatives[1][:, 0]
+
+    @property
+    def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
+        """d cop / d CoM, as `CopSensitivity.com_gain`."""
+        change = self.stance.unstack(self._derivatives[0][:, 1:])
+        return cop_rates(self.equilibrium, contact_cops(self.equilibrium), change)
+
+    @cached_property
+    def sensitivity(self) -> CopSensitivity:
+        """The sensitivity of every contact's centre of pressure there, along every motion."""
+        return sensitivity_of(self.equilibrium)
+
+    @cached_property
+    def _derivatives(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of forces and torques along the path, and along CoM x and y."""
+        directions = np.column_stack([self.tangent, self.stance.com_motions])
+        return self.equilibrium.derivative(directions)
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where on its way one of several quantities first falls below zero.
+
+    Attributes:
+        row: which of them.
+        travel: how far from the start, in units of the path's coordinate.
+        value: the coordinate there.
+    """
+
+    row: int
+    travel: float
+    value: float
+
+
+@dataclass(frozen=True)
+class LimitTravel:
+    """How far the path may be followed until one limit is reached.
+
+    Attributes:
+        margin: the margin of the contact or joint to this kind of limit where the path begins.
+        name: the very limit that is met (another edge than the nearest one at the start, say);
+            where none is met within reach, the one predicted.
+        first_order: its travel predicted by the slack and its derivative there [m]; infinite if it
+            moves away, 0 where it is beyond its bound already.
+        exact: its travel found along the path [m]; None if no such limit is met within reach.
+    """
+
+    margin: LimitMargin
+    name: str
+    first_order: float
+    exact: float | None
+
+
+@dataclass(frozen=True)
+class Travel:
+    """What the CoM meets on its way to one side.
+
+    Attributes:
+        direction: +1 towards rising values of the path's coordinate (world +y), or -1.
+        limits: every limit, the nearest by exact travel first.
+        reach: how far the path was followed [m]; less than asked where no posture was found.
+    """
+
+    direction: int
+    limits: tuple[LimitTravel, ...]
+    reach: float
+
+    @property
+    def first(self) -> LimitTravel | None:
+        """The limit met first, or None if none is met within reach."""
+        return self.limits[0] if self.limits and self.limits[0].exact is not None else None
+
+
+class PathScan:
+    """A criterion along a path, every posture solved once and kept.
+
+    Attributes:
+        path: the postures.
+        criterion: what shares the load.
+        limits: what the wrenches and torques respect; None for the criterion's own.
+        start: the coordinate from which travel is measured.
+    """
+
+    def __init__(
+        self,
+        path: PosturePath | LateralPath,
+        criterion: Criterion,
+        limits: Limits | None = None,
+        *,
+        start: float | None = None,
+    ) -> None:
+        """Nothing is solved before it is asked for.
+
+        Args:
+            path: the postures; a `LateralPath` may serve several scans, which then share them.
+            criterion: what shares the load.
+            limits: what the wrenches and torques must respect; None for nothing.
+            start: the coordinate from which travel is measured; default that of the middle posture.
+
+        Raises:
+            InvalidInputError: a policy, which has no derivatives.
+        """
+        if not isinstance(criterion, Criterion):
+            raise InvalidInputError(
+                "a policy q -> wrenches has no exact derivatives to scan a path with. Give a "
+                "Criterion."
+            )
+        self.path, self.criterion, self.limits = path, criterion, limits
+        values = np.asarray(path.values, dtype=float)
+        self.start = float(values[len(values) // 2] if start is None else start)
+        nearest = float(values[int(np.argmin(np.abs(values - self.start)))])
+        near = abs(nearest - self.start) <= _SAME
+        # Where a search sets out: the start itself if the path has a posture there.
+        self._begin = nearest if near or not path.continuous else self.start
+        self._points: dict[float, ScanPoint] = {}
+
+    @property
+    def begin(self) -> ScanPoint:
+        """Where a search sets out: at the start, or at the posture nearest to it."""
+        return self.at(self._begin)
+
+    def at(self, value: float) -> ScanPoint:
+        """The equilibrium at a value of the path's coordinate, solved once.
+
+        Raises:
+            CopsenseError: no posture there, or no wrenches.
+        """
+        value = float(value)
+        if value not in self._points:
+            stance, tangent = self.path.at(value)
+            found = solve_equilibrium(stance, self.criterion, self.limits)
+            self._points[value] = ScanPoint(value, tangent, found)
+        return self._points[value]
+
+    @property
+    def points(self) -> tuple[ScanPoint, ...]:
+        """The equilibria at all of the path's postures.
+
+        Raises:
+            CopsenseError: one of them has none.
+        """
+        return tuple(self.at(value) for value in self.path.values)
+
+    @property
+    def forces(self) -> Float[np.ndarray, "N m"]:
+        """Stacked contact forces at the path's postures, contact axes [N, Nm]."""
+        return np.array([point.forces for point in self.points])
+
+    @property
+    def torques(self) -> Float[np.ndarray, "N n"]:
+        """Joint torques at the path's postures [Nm]."""
+        return np.array([point.torques for point in self.points])
+
+    @property
+    def force_rates(self) -> Float[np.ndarray, "N m"]:
+        """d forces / d coordinate at the path's postures."""
+        return np.array([point.force_rates for point in self.points])
+
+    @property
+    def torque_rates(self) -> Float[np.ndarray, "N n"]:
+        """d torques / d coordinate at the path's postures."""
+        return np.array([point.torque_rates for point in self.points])
+
+    def slacks(self, limits: Limits) -> tuple[Float[np.ndarray, "N r"], Float[np.ndarray, "N r"]]:
+        """Slack b - A f of every row of limits at the path's postures, and its derivative.
+
+        The rows are those of `margin_table`.
+        """
+        table = margin_table(self.points[0].stance, limits)
+        return (
+            table.slack(self.forces, self.torques),
+            table.slack_rates(self.force_rates, self.torque_rates),
+        )
+
+    def margins(self, limits: Limits) -> Float[np.ndarray, "N g"]:
+        """The smallest margin of each contact or joint to each kind of limit, in its own unit.
+
+        The groups are those of `margin_table`. NaN to the edge of a sole that does not push.
+        """
+        table = margin_table(self.points[0].stance, limits)
+        return table.group_margins(self.forces, self.torques)
+
+    def first(
+        self, measure: Measure, side: int = 1, *, reach: float = np.inf, exact: bool = True
+    ) -> Crossing | None:
+        """Where one of several quantities first falls below zero on the way to one side.
+
+        Args:
+            measure: a point -> the quantities (r,) and their derivatives along the coordinate (r,).
+            side: +1 towards rising values of the coordinate, or -1.
+            reach: how far to look.
+            exact: refine the root by solving postures in between, if the path can give them; False
+                leaves it at the cubic between its own postures.
+
+        Returns:
+            The first crossing; at the beginning where a quantity is below zero there already. None
+            if none falls below zero within reach, or on the path.
+
+        Raises:
+            CopsenseError: a posture on the way has no equilibrium.
+        """
+        side = check_side(side)
+
+        def evaluate(travel: float) -> tuple[np.ndarray, np.ndarray]:
+            values, rates = measure(self.at(self.start + side * travel))
+            return values, side * rates
+
+        track = Track(evaluate if exact and self.path.continuous else None)
+        before = 0.0
+        for value in self._outwards(side):
+            travel = side * (value - self.start)
+            values, rates = measure(self.at(value))
+            track.add(travel, values, side * rates)
+            found = track.first_zero(after=before, tolerance=_PRECISION)
+            if found:
+                return self._crossing(found, side) if found[0] <= reach else None
+            if travel >= reach:
+                return None
+            before = travel
+        return None
+
+    def travel(self, limits: Limits, side: int = 1) -> Travel:
+        """How far the path may be followed to one side until each limit is reached.
+
+        Args:
+            limits: what is to be met. The scan's own `PathScan.limits` are usually None here: the
+                question is when the criterion's own wrenches would be clipped.
+            side: +1 towards rising values of the coordinate, or -1.
+        """
+        side = check_side(side)
+        begin = self.begin
+        table = margin_table(begin.stance, limits)
+
+        def measure(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:
+            return table.slack(point.forces, point.torques), side * table.slack_rates(
+                *_rates(point)
+            )
+
+        track = Track(lambda travel: measure(self.at(self.start + side * travel)))
+        reach = 0.0
+        for value in self._outwards(side):
+            try:
+                point = self.at(value)
+            except CopsenseError:
+                break  # no posture, or no wrenches, further on
+            reach = side * (value - self.start)
+            track.add(reach, *measure(point))
+        slack = table.slack(begin.forces, begin.torques)
+        rates = side * table.slack_rates(begin.force_rates, begin.torque_rates)
+        values = table.values(begin.forces, begin.torques)
+        nears = -rates > _CLOSING * np.abs(slack)
+        closing = np.where(nears, slack / np.where(nears, -rates, 1.0), np.inf)
+        closing = np.where(slack < 0, 0.0, closing)
+        found = []
+        for rows in table.groups:
+            crossing = track.first_zero(rows, tolerance=_PRECISION)
+            exact, row = crossing or (None, int(rows[int(np.argmin(closing[rows]))]))
+            margin, first = table.margin(rows, values), float(closing[row])
+            found.append(LimitTravel(margin, table.names[row], first, exact))
+        found.sort(key=lambda f: (np.inf if f.exact is None else f.exact, f.first_order))
+        return Travel(side, tuple(found), reach)
+
+    def next_active_set_change(self, side: int = 1) -> ActiveSetChange | None:
+        """Follow the path to one side until another set of the scan's limits presses.
+
+        From a posture at which none does, that is where the first one binds.
+
+        Args:
+            side: +1 towards rising values of the coordinate, or -1.
+
+        Returns:
+            The change, or None if there is none within reach.
+
+        Raises:
+            InvalidInputError: the scan has no limits.
+            InfeasibleError: no wrench respects the limits where the path begins.
+        """
+        side = check_side(side)
+        if self.limits is None or not self.limits.any:
+            raise InvalidInputError("no limit is switched on: there is none to meet. Give one.")
+        limits, begin = self.limits, self.begin
+        assert isinstance(begin.equilibrium, ConstrainedEquilibrium)
+        predicted = begin.sensitivity.next_active_set_change(side * begin.tangent)
+        pressing = begin.equilibrium.pressing_after(side * begin.tangent)
+
+        def evaluate(travel: float) -> tuple[np.ndarray, np.ndarray]:
+            here, tangent = self.path.at(self.start + side * travel)
+            return distance_to_change(here, self.criterion, limits, pressing, side * tangent)
+
+        track = Track(evaluate)
+        before = _HERE
+        track.add(before, *evaluate(before))
+        if np.any(track.values_at(before) < -_ROUNDING):
+            found: tuple[float, int] | None = (before, int(np.argmin(track.values_at(before))))
+        else:
+            found = None
+            for value in self._outwards(side):
+                travel = side * (value - self.start)
+                if travel <= before:
+                    continue
+                try:
+                    track.add(travel, *evaluate(travel))
+                except CopsenseError:
+                    break  # no posture further on
+                a, b = track.values_at(before), track.values_at(travel)
+                rows = np.flatnonzero((b < -_ROUNDING) | ((a > _ROUNDING) & (b > _ROUNDING)))
+                found = track.first_zero(rows, after=before, tolerance=_CHANGE_PRECISION)
+                if found:
+                    break
+                before = travel
+        if found is None:
+            return None
+        travel, row = found
+        there = self.start + side * travel
+        left, right = self._sides(there, side)
+        return ActiveSetChange(
+            self.criterion.name,
+            begin.equilibrium.names[row],
+            begin.equilibrium.kinds[row],
+            row not in pressing,
+            travel,
+            np.inf if predicted is None else predicted.travel,
+            there,
+            left,
+            right,
+        )
+
+    def _outwards(self, side: int) -> Iterator[float]:
+        """Values of the coordinate from the beginning to one end of the path."""
+        values = np.asarray(self.path.values, dtype=float)
+        yield self._begin
+        beyond = values[side * (values - self._begin) > _SAME]
+        yield from (float(value) for value in (beyond if side > 0 else beyond[::-1]))
+
+    def _crossing(self, found: tuple[float, int], side: int) -> Crossing:
+        travel, row = found
+        return Crossing(row, travel, self.start + side * travel)
+
+    def _sides(self, value: float, side: int) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """dCoP/dcoordinate before and after on the way; None where there is none."""
+        try:
+            here, tangent = self.path.at(value)
+            there = cop_sensitivity(here, self.criterion, self.limits)
+        except CopsenseError:
+            return None, None  # a contact that just unloads has no centre of pressure to speak of
+        found: list[np.ndarray | None] = []
+        for one in (-side, side):
+            try:
+                found.append(there.one_sided(tangent, side=one))
+            except CopsenseError:
+                found.append(None)  # the limits may leave no way: a brink, or a sole's corner
+        return found[0], found[1]
+
+
+def limit_travel(
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    direction: int = 1,
+    *,
+    reach: float = 0.15,
+    samples: int = 15,
+) -> Travel:
+    """Travel of the CoM sideways until each limit binds, first order and exact.
+
+    The path is the lateral sweep's through this stance: CoM x held, postures nearest to it. The
+    wrenches are the criterion's own, without limits: the question is when they would be clipped.
+    For several criteria or sides share the postures: ``PathScan(path, criterion).travel(limits)``
+    with one `LateralPath`.
+
+    Args:
+        stance: where the path begins.
+        criterion: what shares the load.
+        limits: what is to be met.
+        direction: +1 towards world +y, -1 towards -y.
+        reach: how far to look [m].
+        samples: postures looked at before the crossings are refined.
+
+    Raises:
+        InvalidInputError: a direction other than +1 or -1, or nothing to look at.
+    """
+    check_side(direction)
+    return PathScan(LateralPath(stance, reach, samples), criterion).travel(limits, direction)
+
+
+def next_active_set_change(
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    direction: int = 1,
+    *,
+    reach: float = 0.15,
+    samples: int = 15,
+) -> ActiveSetChange | None:
+    """Follow the lateral path of a stance until another set of limits presses.
+
+    The wrenches are those within the limits. For several criteria or sides share the postures:
+    ``PathScan(path, criterion, limits).next_active_set_change(side)`` with one `LateralPath`.
+
+    Args:
+        stance: where the path begins.
+        criterion: what shares the load.
+        limits: what is to be met.
+        direction: +1 towards world +y, -1 towards -y.
+        reach: how far to look [m].
+        samples: postures looked at before the change is refined.
+
+    Returns:
+        The change, its travel and value in metres of CoM y, or None if there is none within reach.
+
+    Raises:
+        InvalidInputError: a direction other than +1 or -1, or no limit to meet.
+        InfeasibleError: no wrench respects the limits where the path begins.
+    """
+    check_side(direction)
+    path = LateralPath(stance, reach, samples)
+    return PathScan(path, criterion, limits).next_active_set_change(direction)
+
+
+def check_side(side: int) -> int:
+    """A side of a path.
+
+    Raises:
+        InvalidInputError: it is not +1 or -1.
+    """
+    if side not in (1, -1):
+        raise InvalidInputError(
+            f"the direction is +1 or -1 along the path's coordinate (world y), got {side}."
+        )
+    return int(side)
+
+
+def _rates(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:
+    """Rates of forces and torques; NaN at a posture where they have no derivative."""
+    try:
+        return point.force_rates, point.torque_rates
+    except CopsenseError:
+        return np.full_like(point.forces, np.nan), np.full_like(point.torques, np.nan)

@@ -1,0 +1,76 @@
+"""QuasiStatic: how far a motion is from one that is slow enough for statics.
+
+On flat ground the net centre of pressure of a motion is not under the CoM, but off by
+(h c'' - L' / m) / g: h the height of the CoM and L the angular momentum about it. Along a path with
+tangent t both are rates of the path's coordinate s, so that the CoP goes farther than the CoM by
+``lever s'' / g`` with the lever ``h - L_x / m`` (L_x per unit of the CoM's velocity along y).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.controllers.target import Signal
+from copsense.stance import Stance
+
+STATIC_SHARE = 0.05  # of the CoM's motion: up to here statics are called good enough
+
+
+@dataclass(frozen=True)
+class QuasiStatic:
+    """How much farther the net centre of pressure of a motion goes than its centre of mass.
+
+    Attributes:
+        lever: h - L_x / m where the path begins [m].
+        excess: peak distance of the net centre of pressure from the CoM's projection [m].
+        share: that in shares of the CoM's largest excursion; of a sine w^2 lever / g.
+        frequency: up to which a sine's share is at most 0.05 [Hz].
+    """
+
+    lever: float
+    excess: float
+    share: float
+    frequency: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the motion is slow enough for statics, within 5 %."""
+        return self.share <= STATIC_SHARE
+
+
+def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Signal) -> QuasiStatic:
+    """How far a signal along a path is from being followed at rest.
+
+    Args:
+        stance: where the path begins.
+        tangent: dq/dcoordinate there (nv,).
+        signal: the coordinate, relative to the start, as a function of time.
+    """
+    model, mass = stance.robot.model, stance.robot.mass
+    g = stance.robot.weight / mass
+    ground = float(np.mean([place.translation[2] for place in stance.placements]))
+    height = float(stance.com[2]) - ground
+    _, _, _, ax, ay, _ = pin.computeCentroidalMap(model, model.createData(), stance.q) @ tangent
+    vx, vy, _ = stance.com_jacobian @ tangent
+    speed = math.hypot(vx, vy)
+    if speed == 0:
+        return QuasiStatic(0.0, 0.0, 0.0, math.inf)
+    lever = math.hypot(height * vx + ay / mass, height * vy - ax / mass) / speed
+    excess = lever * speed * peak_acceleration(signal) / g
+    reach = speed * max(abs(end) for end in signal.extent)
+    share = excess / reach if reach else 0.0 if excess == 0 else math.inf
+    frequency = math.sqrt(STATIC_SHARE * g / lever) / (2 * math.pi) if lever else math.inf
+    return QuasiStatic(lever, excess, share, frequency)
+
+
+def peak_acceleration(signal: Signal) -> float:
+    """Largest second derivative of a signal; of one of the user's own over its first minute."""
+    known = getattr(signal, "peak_acceleration", None)
+    if known is not None:
+        return float(known)
+    return max(abs(signal.at(0.01 * i)[2]) for i in range(6000))
