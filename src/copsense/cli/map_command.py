@@ -11,8 +11,8 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, progress_bar
-from copsense.cli.quantities import read_quantity
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
