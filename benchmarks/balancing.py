@@ -2,8 +2,9 @@
 
     python benchmarks/balancing.py [--force] [--jobs N] [--plot FILE]
 
-Runs the plan balancing.toml (about ten minutes on two cores), of which only what the table lacks;
---force starts it anew. The page says whether each requirement holds, and the exit code 1 if not.
+Runs the cases of balancing.toml that the table lacks (all: about ten minutes on two cores); with
+--force it runs all of them again. The page lists each requirement, and the exit code is 1 if one
+does not hold.
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def lines_of(table: pd.DataFrame, columns: dict[str, Callable[[pd.Series], str]]
 
 
 def number(name: str, digits: int, factor: float = 1.0) -> Callable[[pd.Series], str]:
-    """A column of numbers; nothing where there is none."""
+    """A column of numbers; empty for NaN and infinity."""
 
     def write(row: pd.Series) -> str:
         value = float(row[name]) * factor
@@ -60,7 +61,7 @@ def number(name: str, digits: int, factor: float = 1.0) -> Callable[[pd.Series],
 
 
 def value(digits: int, factor: float = 1.0) -> Callable[[pd.Series], str]:
-    """What was measured, with its resolution; or as far as is known."""
+    """A column of values with their resolution, or of bounds."""
 
     def write(row: pd.Series) -> str:
         low, high = row["low"] * factor, row["high"] * factor
@@ -74,7 +75,7 @@ def value(digits: int, factor: float = 1.0) -> Callable[[pd.Series], str]:
 
 
 def word(name: str) -> Callable[[pd.Series], str]:
-    """A column of words."""
+    """A column of text."""
     return lambda row: str(row[name]).replace("|", "/")
 
 
@@ -85,7 +86,7 @@ def scores(table: pd.DataFrame, score: str, trial: str | None = None) -> pd.Data
 
 
 def checks(table: pd.DataFrame) -> list[tuple[str, str, bool]]:
-    """What must hold, what was measured, and whether it does."""
+    """Requirements, what was measured, and whether each holds."""
     leans = scores(table, "tip_excursion")
     off = (leans["value"] - leans["predicted"]).abs() * 1e3
     found = [
@@ -136,7 +137,7 @@ def checks(table: pd.DataFrame) -> list[tuple[str, str, bool]]:
 
 
 def page(table: pd.DataFrame) -> list[str]:
-    """What the table says, in words and small tables."""
+    """The page's sections."""
     who = {"posture": word("posture"), "controller": word("controller")}
     both = {"robot": word("robot")} | who
     static = {"static path": number("predicted", 2), "first order": number("first_order", 2)}
@@ -167,7 +168,8 @@ def page(table: pd.DataFrame) -> list[str]:
         ),
         "",
         "A tip is a sole turned by 0.5 degrees: a little after its CoP reaches the edge of a "
-        "rectangular sole, a little before it reaches a mesh's rounded one (talos).",
+        "rectangular sole, a little before it on a sole with round edges (talos), whose outermost "
+        "vertices are soft springs: contact_compliance.py shows what the contacts' softness does.",
         "",
         "## The first push that tips a foot (50 ms, to the left, on the base) [N s]",
         "",
@@ -205,8 +207,8 @@ def page(table: pd.DataFrame) -> list[str]:
         "",
         "## Where a sway of 20 mm at 0.2 Hz breaks",
         "",
-        "The largest value of what disturbs that is survived, and the next one tried, after which "
-        "a contact tips within the period. The torque limit is on the legs; beside it their "
+        "The largest disturbance that is survived, and the next one tried, with which a contact "
+        "tips within the period. The torque limit is that of the legs; beside it stands their "
         "largest static torque on the way.",
         "",
         *lines_of(
@@ -236,7 +238,7 @@ def page(table: pd.DataFrame) -> list[str]:
             },
         ),
         "",
-        "The static analysis predicts no falls, and none is claimed for it.",
+        "The static analysis does not predict falls.",
         "",
         "## Prediction against simulation",
         "",
@@ -255,12 +257,12 @@ def page(table: pd.DataFrame) -> list[str]:
             },
         ),
         "",
-        CAVEAT + " The cases are few and alike, so the interval is that of these cases.",
+        CAVEAT + " The cases are few and similar, so the interval holds for these cases.",
         "",
         "## Ranking",
         "",
-        "1 plus the number of controllers that are better beyond the resolution, averaged over "
-        "the settings in which all were tried.",
+        "1 plus the number of controllers that are better by more than the resolution, averaged "
+        "over the settings in which all were tried.",
         "",
         *lines_of(
             ranking,
@@ -323,9 +325,9 @@ def _timed(what: str, run: Callable[[], object], count: int = 2000) -> str:
 def main() -> int:
     """Run what is missing, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--force", action="store_true", help="run everything anew")
+    parser.add_argument("--force", action="store_true", help="run every case again")
     parser.add_argument("--jobs", type=int, default=min(os.cpu_count() or 1, 8))
-    parser.add_argument("--plot", metavar="FILE", help="draw the table, too: .png, .svg or .pdf")
+    parser.add_argument("--plot", metavar="FILE", help="also draw the table: .png, .svg or .pdf")
     options = parser.parse_args()
     shape = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"
     with tqdm(total=1.0, desc="balancing", bar_format=shape, disable=None) as bar:

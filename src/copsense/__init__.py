@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from copsense.regions import com_regions
     from copsense.robot import Robot
     from copsense.robots import load_robot, load_stance
+    from copsense.scan import PathScan
     from copsense.sensitivity import check_sensitivity, cop_sensitivity
     from copsense.simulation import Recording, balance
     from copsense.stance import Stance
@@ -47,6 +48,7 @@ __all__ = [
     "CopsenseError",
     "Criterion",
     "Limits",
+    "PathScan",
     "Plane",
     "PosturePath",
     "Recording",
@@ -123,6 +125,7 @@ _HOMES = {
         "load_robot",
         "load_stance",
     ),
+    "copsense.scan": ("PathScan",),
     "copsense.sensitivity": (
         "check_sensitivity",
         "cop_sensitivity",

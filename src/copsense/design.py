@@ -304,8 +304,8 @@ def families(stance: Stance) -> dict[str, Family]:
     """The families that can be designed at a stance, by name.
 
     ``length``: the minimum wrench's characteristic length. ``joints``: torque weights of hips,
-    knees and ankles, told by the joints' names, or else by their place between contact and base;
-    the last group counts 1. ``mix``: the minimum torque with a share of the minimum wrench.
+    knees and ankles, by the joints' names, or else by their place between contact and base; the
+    last group counts 1. ``mix``: the minimum torque with a share of the minimum wrench.
     """
     groups = joint_groups(stance)
     free = tuple(groups)[:-1]

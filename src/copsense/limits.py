@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
-from typing import Literal
+from dataclasses import dataclass, fields
+from functools import cache, cached_property, lru_cache
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.arrays import array_property
+from copsense.arrays import array_property, owned, read_only
 from copsense.contact import Contact
+from copsense.content import ByContent, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
+from copsense.robot import Robot
 from copsense.stance import Stance
+from copsense.wrench_cone import unit_cone
 
 _ROUNDING = 1e-9  # m
 _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
@@ -23,9 +26,11 @@ _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrenc
 TorqueLimits = Literal["model"] | Mapping[str, float] | float
 
 
-@dataclass(frozen=True)
-class Limits:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Limits(ByContent):
     """What contact wrenches and torques must respect; None switches a limit off.
+
+    Limits are given by keyword; they compare and hash by content.
 
     Attributes:
         normal_force: least normal force of every contact [N].
@@ -39,7 +44,7 @@ class Limits:
             friction and centre-of-pressure limits too; None switches it off.
         torque: ``"model"`` for the model's effort limits, a number for every joint, or joint ->
             limit [Nm]; None switches it off. Placeholders of the model (see
-            `Robot.effort_limits`) are no limits: `torque_placeholders` names them.
+            `Robot.effort_limits`) do not count as limits: `torque_placeholders` names them.
     """
 
     normal_force: float | None = 0.0
@@ -50,7 +55,8 @@ class Limits:
     torque: TorqueLimits | None = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers that limit nothing or everything."""
+        """Own the torque limits; reject numbers that limit nothing or everything."""
+        object.__setattr__(self, "torque", own(self.torque))
         for name in ("normal_force", "friction", "cop_margin", "torsion"):
             value = getattr(self, name)
             if isinstance(value, str):
@@ -61,6 +67,8 @@ class Limits:
                 raise InvalidInputError(
                     f"limit {name} must be a non-negative number or None, got {value}."
                 )
+            elif value is not None:
+                object.__setattr__(self, name, float(value))
         sides: object = self.friction_sides
         number = float(sides) if isinstance(sides, int | float | np.integer) else float("nan")
         if not (number >= 3 and number.is_integer()):
@@ -68,6 +76,7 @@ class Limits:
                 f"a friction pyramid has a whole number of sides, 3 or more; got "
                 f"{self.friction_sides}."
             )
+        object.__setattr__(self, "friction_sides", int(number))
         if isinstance(self.torque, str):
             if self.torque != "model":
                 raise UnknownNameError("torque limit", self.torque, ("model",))
@@ -76,10 +85,43 @@ class Limits:
                 self.torque if isinstance(self.torque, Mapping) else {"every joint": self.torque}
             )
             for joint, value in given.items():
-                if not float(value) >= 0:
+                if not (isinstance(value, int | float) and value >= 0):
                     raise InvalidInputError(
                         f"torque limits must be non-negative numbers [Nm], got {value} for {joint}."
                     )
+
+    def _fields(self) -> tuple[object, ...]:
+        return tuple(getattr(self, each.name) for each in fields(self))
+
+    def __repr__(self) -> str:
+        """Every limit; of many torque limits the first few."""
+        shown = (
+            f"{name}={show(value) if isinstance(value, dict) else repr(value)}"
+            for name, value in self.to_dict().items()
+        )
+        return f"Limits({', '.join(shown)})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data of every field, for JSON or TOML: `from_dict` reads it back."""
+        return {each.name: plain(getattr(self, each.name)) for each in fields(self)}
+
+    @classmethod
+    def from_dict(cls, data: object) -> Limits:
+        """The limits that `to_dict` wrote; a field that is missing has its default.
+
+        Raises:
+            InvalidInputError: not a table of limits, or a value that limits nothing.
+            UnknownNameError: an unknown key.
+        """
+        if not isinstance(data, Mapping):
+            raise InvalidInputError(
+                f"limits in a file are a table, as Limits.to_dict() writes it; this is {data!r}."
+            )
+        known = tuple(each.name for each in fields(cls))
+        for key in data:
+            if key not in known:
+                raise UnknownNameError("limit", str(key), known)
+        return cls(**data)
 
     @property
     def any(self) -> bool:
@@ -151,8 +193,12 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
             sole is too narrow for its margin.
         UnknownNameError: a torque limit names no joint.
     """
-    names = stance.robot.torque_names
-    return rows_of(stance.contacts, limits, torque_limits(stance, limits.torque), names)
+    return _rows(stance.robot, tuple(stance.contacts), limits)
+
+
+@lru_cache(maxsize=32)  # a path's postures share theirs
+def _rows(robot: Robot, contacts: tuple[Contact, ...], limits: Limits) -> LimitRows:
+    return rows_of(contacts, limits, _torque_limits(robot, limits.torque), robot.torque_names)
 
 
 def rows_of(
@@ -176,23 +222,31 @@ def rows_of(
             owners.append(k)
             kinds.append(kind)
     return LimitRows(
-        np.array(matrix).reshape(-1, m),
-        np.array(bound, dtype=float),
+        read_only(np.array(matrix).reshape(-1, m)),
+        read_only(np.array(bound, dtype=float)),
         tuple(names),
         tuple(owners),
         tuple(kinds),
-        torque,
+        owned(torque),
         joints,
     )
 
 
 def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
-    """Limit of the size of each joint's torque [Nm], infinite where there is none."""
-    names = stance.robot.torque_names
+    """Limit of the size of each joint's torque [Nm], infinite where there is none.
+
+    Raises:
+        UnknownNameError: a limit names no joint.
+    """
+    return _torque_limits(stance.robot, limits)
+
+
+def _torque_limits(robot: Robot, limits: TorqueLimits | None) -> Float[np.ndarray, " n"]:
+    names = robot.torque_names
     if limits is None:
         return np.full(len(names), np.inf)
     if isinstance(limits, str):
-        return stance.robot.effort_limits
+        return robot.effort_limits
     if isinstance(limits, Mapping):
         for joint in limits:
             if joint not in names:
@@ -203,8 +257,9 @@ def torque_limits(stance: Stance, limits: TorqueLimits | None) -> Float[np.ndarr
 
 def torque_placeholders(stance: Stance) -> tuple[str, ...]:
     """Joints whose effort limit in the model is a placeholder: none, zero, or absurdly large."""
-    limits = torque_limits(stance, "model")
-    return tuple(n for n, t in zip(stance.robot.torque_names, limits, strict=True) if np.isinf(t))
+    robot = stance.robot
+    pairs = zip(robot.torque_names, robot.effort_limits, strict=True)
+    return tuple(name for name, limit in pairs if np.isinf(limit))
 
 
 Row = tuple[str, str, Float[np.ndarray, " 6"], float]
@@ -305,47 +360,8 @@ def _cone_rows(contact: Contact, mu: float | None, sides: int) -> list[Row]:
             f"is made for {_CONE_VERTICES} at most. Give a simpler polygon, such as "
             "rectangle(...)."
         )
-    faces = _unit_cone(sole, mu, sides)
+    faces = unit_cone(sole, mu, sides)
     return [("wrench cone", f"wrench cone, face {i}", row, 0.0) for i, row in enumerate(faces)]
-
-
-@cache
-def _unit_cone(sole: Polygon, mu: float, sides: int) -> tuple[Float[np.ndarray, " 6"], ...]:
-    """Face normals of the wrench cone; each vertex pushes with f_z = 1 along the pyramid's edges.
-
-    Their section at f_z = 1 is a polytope over (fx, fy, mx, my, mz); a face of it,
-    n . w + offset <= 0, is a face n . w + offset f_z <= 0 of the cone (Caron et al. 2015).
-    """
-    if mu == 0:
-        raise InvalidInputError(
-            "without friction there is no wrench cone: use friction and CoP rows."
-        )
-    from scipy.spatial import ConvexHull, QhullError  # slow to import, and seldom needed
-
-    angles = 2 * np.pi * np.arange(sides) / sides
-    points = [
-        (fx := mu * np.cos(t), fy := mu * np.sin(t), y, -x, x * fy - y * fx)
-        for x, y in sole.vertices.tolist()
-        for t in angles
-    ]
-    array = np.array(points)
-    # Where Qhull takes little friction for a flat direction, each axis in its own size helps; where
-    # rounding has it merge facets of so regular a section wrongly, looking from elsewhere does.
-    own_size = np.diag(1.0 / np.abs(array).max(axis=0))
-    turns = np.random.default_rng(0).normal(size=(4, 5, 5))
-    for view in (np.eye(5), own_size, *(np.linalg.qr(turn)[0] @ own_size for turn in turns)):
-        try:
-            faces = np.unique(np.round(ConvexHull(array @ view.T).equations, 12), axis=0)
-        except QhullError:
-            continue
-        faces[:, :5] = faces[:, :5] @ view
-        faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
-        if (array @ faces[:, :5].T + faces[:, 5]).max() < _ROUNDING:
-            return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
-    raise InvalidInputError(
-        f"the wrench cone of so thin a sole (friction {mu:g}) could not be computed. Use friction, "
-        "CoP and torsion rows."
-    )
 
 
 def _unit(component: int) -> Float[np.ndarray, " 6"]:

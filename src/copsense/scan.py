@@ -1,4 +1,4 @@
-"""PathScan: one criterion along a path, and where on the way something gives way first.
+"""PathScan: one criterion along a path, and where on the way a limit is reached first.
 
 Each posture is solved once, with the exact derivatives of forces and torques along the path. What
 is asked of a limit is asked of its slack b - A f: between two postures it is the cubic through the
@@ -35,7 +35,7 @@ from copsense.statics import (
 _HERE = 1e-7  # of the coordinate: what changes nearer than this changes here
 _SAME = 1e-9  # of the coordinate: a posture so near to the start is the start
 _ROUNDING = 1e-9  # shares of the weight, or of the cost's gradient, by which nothing has changed
-_CLOSING = 1e-9  # share of a slack, per unit of the coordinate, that is no approach
+_CLOSING = 1e-9  # share of a slack, per unit of the coordinate, that is not an approach
 _PRECISION = 1e-9  # of a travel
 _CHANGE_PRECISION = 1e-12  # of a change: so near that the limit is only touched
 

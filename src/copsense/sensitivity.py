@@ -107,7 +107,7 @@ class CopSensitivity:
         return side * cop_rates(equilibrium, self.cop, wrenches) / abs(rate)
 
     def next_active_set_change(self, tangent: ArrayLike) -> ActiveSetChange | None:
-        """The next limit to bind or to let go along a path, to first order.
+        """The next limit to begin or cease to press along a path, to first order.
 
         `copsense.scan.next_active_set_change` finds the exact one on the lateral path.
 

@@ -322,6 +322,6 @@ def test_plans_that_mean_nothing_are_refused(tmp_path):
         run_benchmark(plan(), jobs=0)
     junk = tmp_path / "junk.csv"
     junk.write_text("a,b\n1,2\n")
-    with pytest.raises(InvalidInputError, match="no table of a benchmark"):
+    with pytest.raises(InvalidInputError, match="not the table of a benchmark"):
         run_benchmark(plan(), junk)
     assert len(make_plan([ROBOT], [STRAIGHT], [C1, C2], [LEAN])) == 2

@@ -163,7 +163,7 @@ def test_a_simulator_that_gives_no_numbers_ends_the_run():
 
     recording = rollout(Lost(icub()), zero, Scenario(0.1))
     assert recording.attrs["end_kind"] == "engine"
-    assert "not finite" in recording.attrs["end_reason"]
+    assert "no longer finite" in recording.attrs["end_reason"]
     assert np.all(np.isfinite(recording["configuration"]))
 
 

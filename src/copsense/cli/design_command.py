@@ -16,7 +16,7 @@ from copsense.errors import UnknownNameError
 if TYPE_CHECKING:
     from copsense.design import Design, Score
 
-_SAME = 1e-6  # relative: less is no gain
+_SAME = 1e-6  # relative: less is not a gain
 
 
 @click.command(

@@ -54,7 +54,7 @@ def reproduce(
     from tqdm import tqdm
 
     form = "{desc} {n}/{total} [{elapsed}]"
-    # A bar where somebody watches, a line a stage elsewhere (disable=None: not on a terminal).
+    # A bar on a terminal, a line a stage elsewhere (disable=None: not on a terminal).
     with tqdm(total=0, disable=quiet or None, leave=False, bar_format=form) as bar:
         stages: list[str] = []
 

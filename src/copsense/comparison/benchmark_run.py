@@ -1,4 +1,4 @@
-"""run_benchmark: a plan over processes into one table, which a stopped run leaves resumable."""
+"""run_benchmark: run the cases of a plan into one table; a stopped run can be resumed."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from copsense.comparison.case_runner import CaseRunner
 from copsense.comparison.score import Score, failed
 from copsense.comparison.scoring import score_trial
 from copsense.comparison.table import (
-    differences,
     load_benchmark,
     make_table,
+    other_parameters,
     scores_of,
     write_table,
 )
@@ -24,7 +24,7 @@ from copsense.files import check_output
 
 
 def run_case(case: Case, progress: Callable[[float], object] | None = None) -> list[Score]:
-    """The scores of one case; what goes wrong is a failed score with its reason.
+    """The scores of one case; an error becomes failed scores with its message.
 
     Args:
         case: what to run.
@@ -34,7 +34,7 @@ def run_case(case: Case, progress: Callable[[float], object] | None = None) -> l
         return score_trial(CaseRunner(case, progress))
     except CopsenseError as error:
         return failed(case.trial.scores, str(error))
-    except (Exception, SystemExit) as error:  # a user's controller or a library: its row says so
+    except (Exception, SystemExit) as error:  # of a user's controller or a library
         return failed(case.trial.scores, f"{type(error).__name__}: {error}")
 
 
@@ -48,27 +48,26 @@ def run_benchmark(
 ) -> pd.DataFrame:
     """Run every case of a plan into one table.
 
-    With an output, the table is written anew, whole, after each case. If it is there already, its
-    rows are kept and only what is missing or failed is run; an interrupted run is so resumed. The
-    table is the same, bit for bit, whatever the number of processes and however often it was
-    interrupted.
+    With an output, the whole table is written after each case. If the file exists, its rows are
+    kept and only missing or failed cases are run: this resumes an interrupted run. The table is the
+    same bit for bit, with any number of processes and interruptions.
 
     Args:
         plan: the cases, with distinct names.
         output: the table, ``.csv``; None keeps it in memory.
-        jobs: how many processes, each with one BLAS thread; a controller or a library that
-            crashes then costs its own case alone. They need a main module that can be imported,
-            as `multiprocessing` has it. None runs the cases here, in turn.
-        overwrite: start a table anew that is there already.
+        jobs: number of processes, each with one BLAS thread; a controller or a library that crashes
+            then fails its own case only. They need a main module that can be imported, as always
+            with `multiprocessing`. None runs the cases in this process, in turn.
+        overwrite: replace an existing table.
         progress: called with the share of the plan done since the last call, out of 1.
 
     Returns:
         The table of `copsense.comparison.load_benchmark`, in the plan's order.
 
     Raises:
-        InvalidInputError: an empty plan, or two cases of one name.
-        OutputError: the table there was made by other parameters (the message says which), or
-            cannot be written.
+        InvalidInputError: the plan is empty, or two cases have the same name.
+        OutputError: the existing table was made with other parameters (the message says which),
+            or the table cannot be written.
     """
     check_plan(plan)
     if jobs is not None and jobs < 1:
@@ -81,7 +80,7 @@ def run_benchmark(
     left = {case.key: case.trial.seconds for case in plan}
 
     def tick(case: Case, seconds: float) -> None:
-        # How long a trial takes is a guess: it never gives more than its share.
+        # How long a trial takes is an estimate: it never counts for more than its share.
         seconds = min(seconds, left[case.key])
         left[case.key] -= seconds
         if progress and seconds:
@@ -107,10 +106,10 @@ def run_benchmark(
 
 
 def check_plan(plan: Sequence[Case]) -> None:
-    """Refuse a plan without cases, or whose cases cannot be told apart.
+    """Reject a plan without cases, or with two cases of the same name.
 
     Raises:
-        InvalidInputError: the message names two that share a name.
+        InvalidInputError: the message gives that name.
     """
     if not plan:
         raise InvalidInputError("the plan has no case. Give a robot, a controller and a trial.")
@@ -127,20 +126,20 @@ def check_plan(plan: Sequence[Case]) -> None:
 def finished_scores(path: Path, plan: Sequence[Case]) -> dict[str, list[Score]]:
     """The scores in a table that a plan need not run again, by the case's key.
 
-    A case that failed is run again: its controller may be mended, or the memory be there now. So is
-    one of which rows are missing.
+    A case that failed is run again: its controller may be fixed, or memory available now. So is a
+    case with missing rows.
 
     Raises:
-        OutputError: it was made by other parameters; the message says what differs.
+        OutputError: the table was made with other parameters; the message says what differs.
     """
     table = load_benchmark(path)
-    lost = table.loc[table["status"] == "failed", "key"]
-    table = table[~table["key"].isin(lost)]
-    if unlike := differences(table, plan):
-        shown = "; ".join(unlike[:6]) + ("; ..." if len(unlike) > 6 else "")
+    again = table.loc[table["status"] == "failed", "key"]
+    table = table[~table["key"].isin(again)]
+    if other := other_parameters(table, plan):
+        shown = "; ".join(other[:6]) + ("; ..." if len(other) > 6 else "")
         raise OutputError(
-            f"{path} was made by other parameters: {shown}. Give another path, or --force "
-            "(overwrite=True) to start it anew."
+            f"{path} was made with other parameters: {shown}. Give another path, or --force "
+            "(overwrite=True) to replace it."
         )
     whole = {case.key: list(case.trial.scores) for case in plan}
     return {

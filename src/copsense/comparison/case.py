@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import PackageNotFoundError, version
 from itertools import product
 from pathlib import Path
 from typing import Any
 
-from copsense._version import __version__
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
 from copsense.comparison.trials import Falls, Trial
 from copsense.controllers import controller_code
 from copsense.errors import InvalidInputError
+from copsense.provenance import digest, plain, versions
 from copsense.robots import PRESETS
 
 IDEAL = Conditions()
@@ -74,13 +72,12 @@ class Case:
         if self.controller.source:
             content = controller_code(self.controller.source)
             found["controller"]["content"] = hashlib.sha256(content).hexdigest()[:12]
-        return found | {"software": _software()}
+        return found | {"software": versions(("mujoco", "pin"))}
 
     @cached_property
     def key(self) -> str:
         """A short name, the same for the same parameters in every process."""
-        text = json.dumps(self.parameters, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
+        return digest(self.parameters)[:12]
 
 
 def make_plan(
@@ -106,37 +103,3 @@ def make_plan(
             robots, postures, conditions, named.items(), controllers
         )
     )
-
-
-def plain(value: Any) -> Any:
-    """Values, tuples and mappings of numbers and words as what JSON can hold.
-
-    Raises:
-        InvalidInputError: something that is no value.
-    """
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"is": type(value).__name__} | {
-            f.name: plain(getattr(value, f.name)) for f in fields(value) if f.init
-        }
-    if isinstance(value, Mapping):
-        return {str(name): plain(part) for name, part in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(part) for part in value]
-    if value is None or isinstance(value, str | bool):
-        return value
-    if isinstance(value, int | float):
-        return float(value)  # 1 and 1.0 are the same parameter
-    raise InvalidInputError(
-        f"{value!r} cannot be part of a benchmark's case. Give numbers, words and values such as "
-        "Motors(delay=0.005)."
-    )
-
-
-def _software() -> dict[str, str]:
-    found = {"copsense": __version__}
-    for package in ("mujoco", "pin"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:  # rows will say that it is missing
-            found[package] = ""
-    return found

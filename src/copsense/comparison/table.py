@@ -1,4 +1,4 @@
-"""Table: the scores of a plan as CSV, a row each, written whole and read back exactly."""
+"""Table: the scores of a plan as CSV, one row each, read back exactly as written."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from copsense.comparison.score import Score
 from copsense.comparison.score_kinds import SCORES
 from copsense.errors import InvalidInputError
 from copsense.files import write_beside
+from copsense.provenance import differences
 
 NAMES = ("robot", "posture", "controller", "conditions", "trial")
 COLUMNS = (
@@ -50,7 +51,7 @@ def make_table(done: Iterable[tuple[Case, Sequence[Score]]]) -> pd.DataFrame:
 
 
 def write_table(done: Iterable[tuple[Case, Sequence[Score]]], path: Path) -> None:
-    """Write a table beside its place and rename it there; numbers are kept to the last bit.
+    """Write a table to a temporary file and rename it; numbers are exact to the last bit.
 
     Raises:
         OutputError: the file cannot be written.
@@ -67,7 +68,7 @@ def load_benchmark(path: str | Path) -> pd.DataFrame:
     """Read the table of a benchmark.
 
     Raises:
-        InvalidInputError: no such file, or no table of a benchmark.
+        InvalidInputError: no such file, or it is not the table of a benchmark.
     """
     path = Path(path)
     try:
@@ -76,7 +77,7 @@ def load_benchmark(path: str | Path) -> pd.DataFrame:
             missing = [name for name in COLUMNS if name not in (reader.fieldnames or ())]
             if missing:
                 raise InvalidInputError(
-                    f"{path} is no table of a benchmark: it lacks {', '.join(missing)}. "
+                    f"{path} is not the table of a benchmark: it lacks {', '.join(missing)}. "
                     f"{_WRITE_ONE}."
                 )
             rows = [_read(row, number, path) for number, row in enumerate(reader, 2)]
@@ -95,8 +96,8 @@ def scores_of(table: pd.DataFrame) -> dict[str, list[Score]]:
     return found
 
 
-def differences(table: pd.DataFrame, cases: Sequence[Case]) -> list[str]:
-    """Where a table was made by other parameters than some cases, in words."""
+def other_parameters(table: pd.DataFrame, cases: Sequence[Case]) -> list[str]:
+    """Where a table was made with other parameters than some cases, in words."""
     keys = {case.key for case in cases}
     labels = {case.label: case for case in cases}
     found: dict[str, None] = {}
@@ -112,20 +113,10 @@ def differences(table: pd.DataFrame, cases: Sequence[Case]) -> list[str]:
             old = json.loads(row["parameters"])
         except ValueError:
             old = {}
-        for name, (then, now) in _unlike(old, case.parameters).items():
-            found[f"{name} was {then}, is now {now}"] = None
+        for part in differences(old, case.parameters):
+            then, now = json.dumps(part.stored), json.dumps(part.asked)
+            found[f"{part.where} was {then}, is now {now}"] = None
     return list(found)
-
-
-def _unlike(old: Any, new: Any, name: str = "") -> dict[str, tuple[str, str]]:
-    """Leaves in which two trees of plain data differ."""
-    if isinstance(old, Mapping) and isinstance(new, Mapping):
-        found: dict[str, tuple[str, str]] = {}
-        for part in {**old, **new}:
-            below = f"{name}.{part}" if name else str(part)
-            found |= _unlike(old.get(part), new.get(part), below)
-        return found
-    return {} if old == new else {name: (json.dumps(old), json.dumps(new))}
 
 
 def _written(value: object) -> object:

@@ -66,7 +66,7 @@ class Hold:
     value: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no number."""
+        """Reject what is not a number."""
         finite_number(self.value, "the value held")
 
     def at(self, time: float) -> tuple[float, float, float]:
@@ -97,7 +97,7 @@ class Sine:
     frequency: float
 
     def __post_init__(self) -> None:
-        """Refuse what is no motion."""
+        """Reject what is not a motion."""
         finite_number(self.amplitude, "the amplitude of a sine")
         finite_number(self.frequency, "the frequency of a sine [Hz]", positive=True)
 
@@ -133,7 +133,7 @@ class Ramp:
     rounding: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse a ramp without speed."""
+        """Reject a ramp without speed."""
         finite_number(self.distance, "the distance of a ramp [m]")
         finite_number(self.speed, "the speed of a ramp [m/s]", positive=True)
         finite_number(self.rounding, "the rounding of a ramp [s]", positive=True)
@@ -263,7 +263,7 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     low, high = min(low, -_SPACING), max(high, _SPACING)
     count = math.ceil((high - low) / _SPACING) + 1
     if count > 5 * _COARSE:
-        # A lean far out of reach is told by a few postures, not by hundreds.
+        # A few postures are enough to see that a lean is far out of reach.
         few = lateral_sweep(
             stance, start + low, start + high, count // _COARSE + 1, com_x=float(stance.com[0])
         )

@@ -127,7 +127,7 @@ def plot_limit_margins(
     """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
 
     Args:
-        dataset: a sweep with margins, from `copsense.with_limit_margins`.
+        dataset: a sweep with margins, from `Sweep.with_limit_margins`.
         axes: where to draw, one for each of `limit_kinds`; default a new figure.
         legend: whether to say which colour is which criterion.
     """

@@ -45,7 +45,7 @@ _LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the
 def plot_results(dataset: Sweep) -> Figure:
     """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel.
 
-    If it has margins to limits, from `copsense.with_limit_margins`, these are drawn below, and a
+    If it has margins to limits, from `Sweep.with_limit_margins`, these are drawn below, and a
     dotted line in each panel where a criterion meets its first limit.
     """
     kinds = limit_kinds(dataset) if "limit_margin" in dataset else []

@@ -95,7 +95,7 @@ class _Problem:
     def _relax(self) -> None:
         """Relax the limits by what rounding takes, or report which are in conflict."""
         soft = 1.0 / self.scale
-        soft[len(self.names) :] = 0.0  # the box is no limit
+        soft[len(self.names) :] = 0.0  # the box is not one of the limits
         found = least_relaxation(self.A, self.b, soft)
         if found is None:
             raise InvalidInputError(_UNSOLVED)

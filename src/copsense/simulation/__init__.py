@@ -1,7 +1,7 @@
-"""Robots in closed loop: a simulator, scenarios, and rollouts of a controller."""
+"""Robots in closed loop: simulators, scenarios, and the recording of a controller's run."""
 
 from copsense.simulation.balance_run import balance
-from copsense.simulation.closed_loop import rollout
+from copsense.simulation.control_loop import rollout
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
 from copsense.simulation.events import Event, Thresholds
 from copsense.simulation.mujoco_simulator import MujocoSimulator

@@ -21,7 +21,7 @@ from copsense.controllers import (
 from copsense.criterion import Criterion, minimum_torque
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
-from copsense.simulation.closed_loop import rollout
+from copsense.simulation.control_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
@@ -86,6 +86,7 @@ def balance(
     if controller is None:
         assert predicted is not None
         controller = BalancingController(stance, predicted, gains, limits=limits)
+    prediction = None if predicted is None else predict(path, predicted, limits)
     recording = rollout(
         simulator,
         controller,
@@ -94,7 +95,7 @@ def balance(
         progress=progress,
         stop=stop,
     )
-    return recording if predicted is None else predict(path, predicted, limits).attach(recording)
+    return recording if prediction is None else prediction.attach(recording)
 
 
 def natural_duration(reference: Signal | PathReference) -> float:

@@ -26,7 +26,7 @@ from copsense.stance import Stance
 # What keeps a contact in its place, but for friction, which is taken as a cone below.
 _GROUND = Limits(normal_force=0.0, friction=None, cop_margin=0.0, torsion=None)
 _TOUCHING = 1e-9  # share of the weight, or metres of it: what has so little left has nothing
-_CLOSING = 1e-12  # share of the weight per metre that is no approach
+_CLOSING = 1e-12  # share of the weight per metre that is not an approach
 _AFTER = 1.0  # s: the controller has answered a push by then
 _HOW = {"cop": "tips", "normal force": "lifts", "friction": "slips"}
 

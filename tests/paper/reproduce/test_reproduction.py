@@ -1,7 +1,5 @@
 """What the iCub's claims come to, and that their verdicts follow from the numbers."""
 
-import math
-
 import numpy as np
 import pytest
 from support.reproductions import POSTURES, small_reproduction
@@ -9,7 +7,7 @@ from support.reproductions import POSTURES, small_reproduction
 import copsense
 from copsense.errors import InvalidInputError
 from copsense.paper.claims import LateralSweep, Verdict, evaluate_icub_claims
-from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, first_crossing
+from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH
 from copsense.paper.closed_form import FourBar
 from copsense.paper.reproduce import reproduce_paper
 
@@ -194,21 +192,6 @@ def test_a_sweep_that_lacks_something_is_refused(reproduction):
     failed["reason"].values[0, 0] = "out of reach"
     with pytest.raises(InvalidInputError, match="out of reach"):
         LateralSweep.from_dataset(copsense.Sweep(failed), four_bar)
-
-
-@pytest.mark.parametrize(
-    ("values", "where"),
-    [
-        ([1.0, 1.0, 0.5, -0.5], 1.5),
-        ([1.0, 1.0, 1.0, 1.0], 2.0),
-        ([1.0, 0.0, 0.5, -0.5], 0.0),
-        ([-1.0, -1.0, 1.0, 1.0], 0.0),
-        ([1.0, 2.0, 0.0, 1.0], 1.0),
-    ],
-)
-def test_the_first_crossing_is_found_between_the_samples(values, where):
-    x = np.array([-1.0, 0.0, 1.0, 2.0])
-    assert math.isclose(first_crossing(x, np.array(values)), where)
 
 
 def test_limits_bind_where_the_reference_soles_end_and_the_other_foot_pays():

@@ -9,11 +9,12 @@ from jaxtyping import Float
 
 from copsense.paper.claims import cop_claims, modelling_claims
 from copsense.paper.claims.claim import Claim, Finding, claim, judge
-from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep, first_crossing
+from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, PAPER_LENGTH, RIGHT
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.discrepancy import EXACT
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
+from copsense.roots import first_zero
 
 _SIMILAR = 0.1  # two curves are similar: within a tenth
 
@@ -134,7 +135,7 @@ def lower_sensitivity(sweep: LateralSweep) -> Finding:
     ratio = np.abs(sweep.series[TORQUE].slope / sweep.series[WRENCH].slope)
     short = np.abs(sweep.series[TORQUE].slope / sweep.series[SHORT].slope)
     worst = ratio.max(axis=1)
-    crossing = min(first_crossing(y, 1 - worst), first_crossing(-y[::-1], (1 - worst)[::-1]))
+    crossing = min(first_zero(y, 1 - worst), first_zero(-y[::-1], (1 - worst)[::-1]))
     centre, over = sweep.at(worst, 0.0), max(worst[0], worst[-1])
     loaded = np.where(y > 0, ratio[:, LEFT], ratio[:, RIGHT])
     return Finding(

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from copsense.errors import InvalidInputError
 from copsense.paper.closed_form.dimensions import FourBar
+from copsense.roots import first_zero
 from copsense.sweeps import Sweep
 
 WRENCH, TORQUE, SHORT = "minimum-wrench", "minimum-torque", "minimum-wrench, L = d/2"
@@ -131,24 +132,9 @@ class LateralSweep:
         """How far the CoM may go to either side with both CoPs in their soles [m]."""
         margin = self.series[criterion].margin.min(axis=1)
         return min(
-            first_crossing(side * self.com_y[order], margin[order])
+            first_zero(side * self.com_y[order], margin[order])
             for side, order in ((1, np.arange(len(margin))), (-1, np.arange(len(margin))[::-1]))
         )
-
-
-def first_crossing(x: Float[np.ndarray, " N"], values: Float[np.ndarray, " N"]) -> float:
-    """Least x >= 0 at which `values` fall to zero, between the samples linearly; else the last x.
-
-    Args:
-        x: rising.
-        values: positive at x = 0.
-    """
-    for i in range(1, len(x)):
-        if x[i] >= 0 and values[i] <= 0:
-            before = max(float(values[i - 1]), 0.0)
-            step = before / (before - values[i]) if before > 0 else 0.0
-            return float(max(x[i - 1] + step * (x[i] - x[i - 1]), 0.0))
-    return float(x[-1])
 
 
 def _series(here: xr.Dataset) -> Series:

@@ -94,6 +94,8 @@ def _write_everything(reproduction: Reproduction, folder: Path, command: str) ->
         drawn = figure.draw()
         pictures[figure.name] = render_figure(drawn, ".svg")
         (folder / "figures" / f"{figure.name}.svg").write_bytes(pictures[figure.name])
+        # Laid out already: a second layout would cost as much as the drawing.
+        drawn.set_layout_engine("none")
         (folder / "figures" / f"{figure.name}.png").write_bytes(render_figure(drawn, ".png"))
     _write_data(reproduction, folder / "data")
     page = render_page(reproduction, pictures, figures, command=command)

@@ -1,4 +1,4 @@
-"""rollout: a controller and a simulator go through a scenario, and what happened is recorded."""
+"""rollout: run a controller and a simulator through a scenario, and record it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 from threadpoolctl import threadpool_limits
 
 from copsense.arrays import finite_number
@@ -20,22 +19,20 @@ from copsense.limits import Limits
 from copsense.provenance import made_by
 from copsense.simulation.actuation import Actuation
 from copsense.simulation.events import Event, EventDetector, Thresholds
-from copsense.simulation.odometry import FootOdometry
+from copsense.simulation.push_forces import PushForces
 from copsense.simulation.recorder import Recorder
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
+from copsense.simulation.sensors import Sensors
 from copsense.simulation.simulator import (
     AlterableSimulator,
     Simulator,
     SimulatorStoppedError,
-    Snapshot,
 )
 from copsense.stance import Stance
 
-_PLACE = 1e-5  # m, rad: contacts nearer than this are at one place
-_STANDS = 0.9  # share of the weight that the ground must carry,
-_SETTLED = 0.02  # and for how long [s], five time constants of a contact, for odometry to begin
-_REPORT = 50  # control periods between two reports of progress
+_PLACE = 1e-5  # m, rad: contacts closer than this are at the same place
+_REPORT = 50  # control periods between two calls of `progress`
 
 
 def rollout(
@@ -57,12 +54,12 @@ def rollout(
         simulator: the robot on its contacts; it is reset first.
         controller: a callable observation -> torques (n,) or `Command`.
         scenario: what to do and what disturbs it.
-        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` goes on
-            to a fall or the scenario's end.
+        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` with a
+            fall or the end of the scenario.
         record_period: time between two rows of the record [s], rounded to control periods.
         thresholds: what counts as a tip or a fall.
         progress: called with the number of control periods done since the last call.
-        stop: asked before every control period; true ends the run.
+        stop: called before every control period; true ends the run.
 
     Returns:
         The recording: centre of mass, wrenches (measured and commanded), CoPs, margins, torques and
@@ -71,12 +68,12 @@ def rollout(
 
     Raises:
         CopsenseError: the scenario does not fit the robot or the simulator.
-        ControllerError: the controller failed before anything could be recorded.
+        ControllerError: the controller failed before anything was recorded.
     """
     finite_number(record_period, "the time between two rows [s]", positive=True)
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
-    # The matrices of a step are small: more BLAS threads than one make it many times slower.
+    # The matrices of a step are small: with more BLAS threads it is many times slower.
     with threadpool_limits(limits=1, user_api="blas"):
         return _run(
             simulator,
@@ -119,7 +116,7 @@ def _run(
     ground = _alterable(simulator, "a change of friction") if changes else None
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
-    sensors, pushes = _Sensors(scenario, believed), _Pushes(scenario, stance, dt)
+    sensors, pushes = Sensors(scenario, believed), PushForces(scenario, stance, dt)
     watch, recorder = EventDetector(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
     count = round(scenario.duration / scenario.control_period)
@@ -128,8 +125,8 @@ def _run(
             f"the scenario lasts {scenario.duration:g} s, less than a control period. Make it "
             "longer."
         )
-    # A sine starts at full speed, and finds the robot moving with it: torques that catch up with a
-    # jump would tip light feet.
+    # A sine starts at full speed, and so does the robot: torques that make up for a jump in the
+    # velocity would tip light feet.
     start = reference.at(0.0).velocity
     now = simulator.reset(start) if np.any(start) else simulator.reset()
     tip, tip_com, reported = None, None, 0
@@ -153,7 +150,7 @@ def _run(
                 now = simulator.step(torques, pushes.at(now))
             if not (np.all(np.isfinite(now.q)) and np.all(np.isfinite(now.v))):
                 now = here
-                raise SimulatorStoppedError("the motion is not finite any more", time)
+                raise SimulatorStoppedError("the motion is no longer finite", time)
             now = sensors.measured(now)
         except ControllerError as error:
             if not len(recorder):
@@ -173,7 +170,7 @@ def _run(
             recorder.add(here, now, target, command, torques, watch.tilts(now))
         if ends:
             end = ends
-            if tip and tip is not ends:  # what came of it
+            if tip and tip is not ends:  # and how it ended
                 then = ends.message.partition(";")[0]
                 end = replace(ends, message=f"{tip.message}; then {then}")
             break
@@ -184,7 +181,7 @@ def _run(
         progress(number + 1 - reported)
     if not len(recorder):
         raise ControllerError(
-            f"the very first torques of controller {name!r} broke the simulation: {end.message}. "
+            f"the first torques of controller {name!r} ended the simulation: {end.message}. "
             "Lower its gains."
         )
     criterion = getattr(controller, "criterion", None)
@@ -213,7 +210,7 @@ def _alterable(simulator: Simulator, what: str) -> AlterableSimulator:
 def _shown(
     time: float, q: np.ndarray, v: np.ndarray, target: Target, wrenches: np.ndarray
 ) -> Observation:
-    """What the controller sees: its to read, not to change."""
+    """What the controller receives, read-only."""
     q, v, wrenches = (seen.view() for seen in (q, v, wrenches))
     for seen in (q, v, wrenches, *vars(target).values()):
         seen.setflags(write=False)
@@ -221,85 +218,16 @@ def _shown(
 
 
 def _check_same(here: Stance, there: Stance, what: str) -> None:
-    """Refuse what is made for another robot, or for the same on other ground."""
+    """Reject what is made for another robot, or for other contacts."""
     ours, theirs = here.robot.joint_names, there.robot.joint_names
     if ours != theirs:
         raise InvalidInputError(
             f"{what} is made for {there.robot.name!r} with {len(theirs)} joints, the simulator is "
-            f"of {here.robot.name!r} with {len(ours)}. Make both of one stance."
+            f"of {here.robot.name!r} with {len(ours)}. Use the same stance for both."
         )
     place, other = (np.array([p.homogeneous for p in s.placements]) for s in (here, there))
     if here.contact_names != there.contact_names or np.abs(place - other).max() > _PLACE:
         raise InvalidInputError(
-            f"{what} is made for other contacts, or contacts elsewhere, than the simulator. Make "
-            "both of one stance."
+            f"{what} is made for other contacts, or contacts elsewhere, than the simulator. Use "
+            "the same stance for both."
         )
-
-
-class _Sensors:
-    """The state as the controller sees it, and the wrenches as anybody does."""
-
-    def __init__(self, scenario: Scenario, stance: Stance) -> None:
-        self._noise, self._model = scenario.noise, stance.robot.model
-        self._random = np.random.default_rng(scenario.seed)
-        # Wrenches have a stream of their own: their noise leaves that of the joints as it was.
-        self._wrench_random = np.random.default_rng([scenario.seed, 1])
-        noise = self._noise
-        self._quiet = not (noise.position or noise.velocity)
-        self._since, self._weight = np.inf, stance.robot.weight
-        self._spread = np.repeat([noise.force, noise.moment], 3)
-        self._odometry = (
-            None if scenario.odometry is None else FootOdometry(stance, scenario.odometry)
-        )
-
-    def read(self, now: Snapshot) -> tuple[np.ndarray, np.ndarray]:
-        q, v = now.q, now.v
-        if not self._quiet:
-            n = self._model.nv - 6
-            turn, v = np.zeros(self._model.nv), now.v.copy()
-            turn[6:] = self._noise.position * self._random.standard_normal(n)
-            v[6:] += self._noise.velocity * self._random.standard_normal(n)
-            q = pin.integrate(self._model, now.q, turn)
-        if self._odometry and self._stood(now):
-            q, v = self._odometry.estimate(q, v, now.wrenches)
-        return q, v
-
-    def _stood(self, now: Snapshot) -> bool:
-        """Whether the robot has stood for a while since the start.
-
-        In a simulation's first milliseconds the ground does not carry yet, and a foot that trembles
-        under no load would pass for a base that flies off: until then the base is known.
-        """
-        if now.time - self._since < _SETTLED:
-            carries = float(now.wrenches[:, 2].sum()) > _STANDS * self._weight
-            self._since = min(self._since, now.time) if carries else np.inf
-        return now.time - self._since >= _SETTLED
-
-    def measured(self, now: Snapshot) -> Snapshot:
-        if not np.any(self._spread):
-            return now
-        noise = self._spread * self._wrench_random.standard_normal(now.wrenches.shape)
-        return replace(now, wrenches=now.wrenches + noise)
-
-
-class _Pushes:
-    """Pushes as a generalised force."""
-
-    def __init__(self, scenario: Scenario, stance: Stance, step: float) -> None:
-        self._step, self._pushes, self._model = step, scenario.pushes, stance.robot.model
-        self._data = self._model.createData()
-
-    def at(self, now: Snapshot) -> np.ndarray | None:
-        shares = [push.share(now.time, self._step) for push in self._pushes]
-        if not any(shares):
-            return None
-        total = np.zeros(self._model.nv)
-        pin.computeJointJacobians(self._model, self._data, now.q)
-        pin.updateFramePlacements(self._model, self._data)
-        for push, share in zip(self._pushes, shares, strict=True):
-            frame = self._model.getFrameId(push.frame)
-            J = pin.getFrameJacobian(
-                self._model, self._data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            )
-            total += share * (J[:3].T @ np.array(push.force))
-        return total

@@ -1,0 +1,73 @@
+"""Limits as values: given by name, equal by content, not to be changed, written as plain data."""
+
+import json
+import pickle
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.limits import NO_LIMITS, Limits, limit_rows
+
+GIVEN = [
+    Limits(),
+    NO_LIMITS,
+    Limits(normal_force=10, friction=1 / 3, friction_sides=4, torsion="cone", torque="model"),
+    Limits(torque={"l_knee": 5, "r_knee": 6.5}, cop_margin=np.float64(0.01)),
+]
+
+
+def test_limits_are_given_by_name():
+    with pytest.raises(TypeError):
+        Limits(10.0, 0.5)
+
+
+@pytest.mark.parametrize("limits", GIVEN)
+def test_limits_are_equal_by_content(limits):
+    for same in (
+        replace(limits),
+        pickle.loads(pickle.dumps(limits)),
+        Limits.from_dict(json.loads(json.dumps(limits.to_dict()))),
+    ):
+        assert same == limits
+        assert hash(same) == hash(limits)
+    assert replace(limits, cop_margin=0.123) != limits
+    assert len({*GIVEN, limits}) == len(GIVEN)
+
+
+def test_limits_cannot_be_changed_afterwards():
+    torque = {"l_knee": 5.0}
+    limits = Limits(torque=torque)
+    torque["l_knee"] = 1e9
+    assert limits == Limits(torque={"l_knee": 5.0})
+    with pytest.raises(TypeError):
+        limits.torque["l_knee"] = 1e9
+    with pytest.raises(FrozenInstanceError):
+        limits.torque = None
+
+
+def test_a_repr_names_every_limit():
+    assert repr(Limits(normal_force=10, torsion=None)) == (
+        "Limits(normal_force=10.0, friction='contact', friction_sides=8, cop_margin=0.0, "
+        "torsion=None, torque=None)"
+    )
+    many = repr(Limits(torque={f"joint{i}": 1.0 for i in range(40)}))
+    assert "torque={'joint0': 1, 'joint1': 1, 'joint2': 1, ... 40 in all}" in many
+
+
+def test_a_table_of_limits_says_what_it_does_not_know():
+    with pytest.raises(UnknownNameError, match="Did you mean cop_margin"):
+        Limits.from_dict({"cop_margn": 0.01})
+    for wrong in (None, [1.0], "model"):
+        with pytest.raises(InvalidInputError, match=r"Limits.to_dict"):
+            Limits.from_dict(wrong)
+
+
+def test_rows_are_made_once_for_a_path(icub):
+    moved = icub.at(icub.q)
+    rows = limit_rows(icub, Limits(torque="model"))
+    assert limit_rows(moved, Limits(torque="model")) is rows
+    assert limit_rows(moved, Limits()) is not rows
+    for array in (rows.matrix, rows.bound, rows.torque):
+        assert not array.flags.writeable
