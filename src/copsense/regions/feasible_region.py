@@ -69,7 +69,7 @@ class _Problem:
         nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
         all_rows = limit_rows(stance, limits)
         rows, bound = all_rows.over_forces(LoadProblem.of(stance))
-        self.names = all_rows.names + all_rows.torque_names
+        self.names = all_rows.all_names
         E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
         self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
         self.N = scipy.linalg.null_space(E)
