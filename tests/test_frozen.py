@@ -21,7 +21,8 @@ def handed_out(value):
 @pytest.mark.parametrize("limits", [None, Limits(torque="model")], ids=["free", "within limits"])
 def test_arrays_that_are_handed_out_are_read_only(icub, limits):
     equilibrium = copsense.solve_equilibrium(icub, copsense.minimum_torque(), limits)
-    for value in (icub.robot, icub, equilibrium):
+    sensitivity = copsense.cop_sensitivity(icub, copsense.minimum_torque(), limits)
+    for value in (icub.robot, icub, equilibrium, sensitivity):
         names = {name for name, _ in handed_out(value)}
         assert names, value
         writeable = {name for name, array in handed_out(value) if array.flags.writeable}

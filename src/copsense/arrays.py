@@ -45,7 +45,7 @@ def finite_array(
         meaning: what its entries are, for the message.
 
     Raises:
-        InvalidInputError: no numbers, another shape, or NaN or infinity.
+        InvalidInputError: not numbers, another shape, or NaN or infinity.
     """
     sizes = ", ".join("any" if n is None else str(n) for n in shape)
     need = f"Give finite numbers of shape ({sizes}{',' if len(shape) == 1 else ''})"
@@ -72,7 +72,7 @@ def finite_number(value: object, what: str, *, positive: bool = False) -> float:
     """One finite number, positive if asked.
 
     Raises:
-        InvalidInputError: it is none.
+        InvalidInputError: it is not one.
     """
     need = "a positive finite number" if positive else "a finite number"
     try:
@@ -90,7 +90,7 @@ def whole_number(value: object, what: str, *, least: int = 1) -> int:
     """One whole number, not below `least`.
 
     Raises:
-        InvalidInputError: it is none.
+        InvalidInputError: it is not one.
     """
     try:
         number = int(value)  # type: ignore[call-overload]

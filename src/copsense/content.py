@@ -45,8 +45,16 @@ class ByContent:
     def _content(self) -> tuple[object, ...]:
         return (type(self).__name__, *(_key(value) for value in self._fields()))
 
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._content)
+
     def _fields(self) -> tuple[object, ...]:
         raise NotImplementedError
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: hashes of text differ from process to process."""
+        return {k: v for k, v in self.__dict__.items() if k not in ("_content", "_hash")}
 
     def __eq__(self, other: object) -> bool:
         """Whether the other has the same content."""
@@ -56,7 +64,7 @@ class ByContent:
 
     def __hash__(self) -> int:
         """A hash of the content."""
-        return hash(self._content)
+        return self._hash
 
 
 def own(value: Any) -> Any:

@@ -25,7 +25,7 @@ def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
     if equilibrium.unloaded:
         raise UnloadedContactError(equilibrium.unloaded)
     w = equilibrium.wrenches
-    return np.column_stack([-w[:, 4], w[:, 3]]) / w[:, 2:3]
+    return np.array([-w[:, 4] / w[:, 2], w[:, 3] / w[:, 2]]).T
 
 
 def center_of_pressure(

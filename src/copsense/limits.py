@@ -44,7 +44,7 @@ class Limits(ByContent):
             friction and centre-of-pressure limits too; None switches it off.
         torque: ``"model"`` for the model's effort limits, a number for every joint, or joint ->
             limit [Nm]; None switches it off. Placeholders of the model (see
-            `Robot.effort_limits`) are no limits: `torque_placeholders` names them.
+            `Robot.effort_limits`) do not count as limits: `torque_placeholders` names them.
     """
 
     normal_force: float | None = 0.0
@@ -147,6 +147,8 @@ class LimitRows:
         kinds: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"`` or ``"wrench cone"``.
         torque: limit of the size of each joint's torque (n,) [Nm]; infinite where there is none.
         joints: name of each of these joints (n,).
+        normals: row of the stacked forces that a centre of pressure is under, its contact's normal
+            force; -1 for any other limit (r,).
     """
 
     matrix: Float[np.ndarray, "r m"]
@@ -156,6 +158,7 @@ class LimitRows:
     kinds: tuple[str, ...]
     torque: Float[np.ndarray, " n"]
     joints: tuple[str, ...]
+    normals: Int[np.ndarray, " r"]
 
     @array_property
     def joint(self) -> Int[np.ndarray, " k"]:
@@ -171,6 +174,16 @@ class LimitRows:
     def torque_names(self) -> tuple[str, ...]:
         """What each torque row limits (k,)."""
         return tuple(f"torque of {self.joints[i]}" for i in self.joint)
+
+    @cached_property
+    def all_names(self) -> tuple[str, ...]:
+        """What each row of `over_forces` limits (r + k,)."""
+        return self.names + self.torque_names
+
+    @cached_property
+    def all_kinds(self) -> tuple[str, ...]:
+        """The kind of each row of `over_forces` (r + k,)."""
+        return self.kinds + ("torque",) * len(self.joint)
 
     def over_forces(
         self, problem: LoadProblem
@@ -208,7 +221,7 @@ def rows_of(
     joints: tuple[str, ...],
 ) -> LimitRows:
     """The same of contacts and joints' torque limits (n,) alone, forces stacked in their order."""
-    matrix, bound, names, owners, kinds = [], [], [], [], []
+    matrix, bound, names, owners, kinds, normals = [], [], [], [], [], []
     m = sum(len(contact.components) for contact in contacts)
     start = 0
     for k, contact in enumerate(contacts):
@@ -221,6 +234,7 @@ def rows_of(
             names.append(f"{contact.name}: {name}")
             owners.append(k)
             kinds.append(kind)
+            normals.append(rows.start + contact.normal_row if kind == "cop" else -1)
     return LimitRows(
         read_only(np.array(matrix).reshape(-1, m)),
         read_only(np.array(bound, dtype=float)),
@@ -229,6 +243,7 @@ def rows_of(
         tuple(kinds),
         owned(torque),
         joints,
+        read_only(np.array(normals, dtype=int)),
     )
 
 

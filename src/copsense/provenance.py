@@ -26,12 +26,15 @@ _LISTED = 5  # differences that an error names
 def plain(value: object) -> Any:
     """A value of copsense as JSON holds it.
 
-    Dataclasses become their fields, with the class's name under ``"is"``; arrays become lists,
-    whole numbers floats (1 and 1.0 are the same parameter), and infinities and NaN words.
+    Criteria become what `Criterion.to_dict` gives, other dataclasses their fields, with the class's
+    name under ``"is"``. Arrays become lists, whole numbers floats (1 and 1.0 are the same
+    parameter), infinities and NaN text.
 
     Raises:
         InvalidInputError: something that is not a value, such as a function.
     """
+    if isinstance(value, Criterion):
+        return plain(value.to_dict())
     if is_dataclass(value) and not isinstance(value, type):
         return {"is": type(value).__name__} | {
             f.name: plain(getattr(value, f.name)) for f in fields(value) if f.init
@@ -160,6 +163,8 @@ def _short(value: Any) -> str:
         and all(isinstance(v, dict) and "name" in v for v in value)
     ):
         value = [v["name"] for v in value]
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import array_property, finite_array, finite_number, owned, read_only
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
@@ -51,7 +51,12 @@ class CopSensitivity:
     wrench_derivative: Float[np.ndarray, "nc 6 p"]
     torque_derivative: Float[np.ndarray, "n p"]
 
-    @cached_property
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        for name in ("cop", "matrix", "wrench_derivative", "torque_derivative"):
+            object.__setattr__(self, name, owned(getattr(self, name)))
+
+    @array_property
     def gradient(self) -> Float[np.ndarray, "nc 2 nv"]:
         """The sensitivity as a gradient over velocities, projected on the admissible motions.
 
@@ -150,24 +155,24 @@ class CopSensitivity:
         """
         return self.equilibrium.stance.com_motions
 
-    @cached_property
+    @array_property
     def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
         """Gamma = d cop / d CoM, dimensionless, independent of the chart.
 
         Rows: CoP x, y in contact axes; columns: CoM x, y in world axes.
         """
-        return self.gradient @ self.com_motions
+        return self.matrix.dot(self.basis.T.dot(self.com_motions))
 
-    @cached_property
+    @array_property
     def load_gain(self) -> Float[np.ndarray, "nc 2"]:
         """Change of each contact's share of the weight, f_z / (m g), per CoM travel [1/m].
 
         Columns: CoM x, y in world axes.
         """
-        normal = self.wrench_derivative[:, 2] @ self.basis.T
-        return np.asarray(normal @ self.com_motions / self.equilibrium.stance.robot.weight)
+        along = self.basis.T.dot(self.com_motions)
+        return self.wrench_derivative[:, 2].dot(along) / self.equilibrium.stance.robot.weight
 
-    @cached_property
+    @array_property
     def unloading_travel(self) -> Float[np.ndarray, " nc"]:
         """How far the CoM may move before a contact carries no load, to first order [m].
 
@@ -178,7 +183,7 @@ class CopSensitivity:
         still = speed <= _STILL
         return np.where(still, np.copysign(np.inf, share), share / np.where(still, 1.0, speed))
 
-    @cached_property
+    @array_property
     def worst_case_gain(self) -> Float[np.ndarray, " nc"]:
         """Largest CoP speed over motions of given kinetic energy, times sqrt(mass).
 
@@ -226,15 +231,16 @@ class CopSensitivity:
             w = float(shares[k])
             slack = w * margin
             rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
-            speed = np.linalg.norm(rate, axis=1)
+            speed = np.hypot(rate[:, 0], rate[:, 1])
             moving = speed > _STILL
-            distance = np.where(moving, slack / np.where(moving, speed, 1.0), np.inf)
+            distance = np.full(len(speed), np.inf)
+            np.divide(slack, speed, out=distance, where=moving)
             # An edge that stands still and is passed already leaves no way back.
             distance[~moving & (slack < -_ON_EDGE)] = -np.inf
-            i = int(np.argmin(distance))
-            if not np.isposinf(distance[i]):
+            i = int(distance.argmin())
+            if distance[i] < np.inf:
                 travel[k], edge[k] = distance[i], i
-        return travel, edge
+        return read_only(travel), read_only(edge)
 
 
 def cop_sensitivity(

@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
+from scipy.linalg import lapack
 
 from copsense import rigid_body
 from copsense.arrays import array_property, read_only
@@ -28,7 +29,9 @@ from copsense.robot import Robot
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost.
 RANK_TOLERANCE = 1e-9
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
+_HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
+_APART = 1e-3  # from here on the CoM's two directions are far from depending on each other
 # How far a contact may lie from its stated plane.
 POSITION_TOLERANCE = 1e-6  # m
 ANGLE_TOLERANCE = 1e-6  # rad
@@ -223,7 +226,7 @@ class Stance:
         """Orthonormal basis Z of the velocities that leave the contacts at rest: J Z = 0."""
         return self._svd[2][self.rank :].T.copy()
 
-    @cached_property
+    @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:
         """Admissible motions Z R of unit kinetic energy, with R R' = (Z' M Z)^-1.
 
@@ -231,11 +234,17 @@ class Stance:
         move no centre of mass.
         """
         Z = self.admissible_motions
-        values, vectors = np.linalg.eigh(Z.T @ self.mass_matrix @ Z)
+        energy = Z.T.dot(self.mass_matrix).dot(Z)
+        if len(energy):
+            factor, info = lapack.dpotrf(energy, lower=1)
+            pivots = factor.diagonal()
+            if info == 0 and pivots.min() > _HEAVY * pivots.max():
+                return np.asarray(lapack.dtrtrs(factor, Z.T, lower=1)[0].T)  # Z L^-T
+        values, vectors = np.linalg.eigh(energy)
         kept = values > _MASSLESS * values.max(initial=0.0)
         return np.asarray(Z @ (vectors[:, kept] / np.sqrt(values[kept])))
 
-    @cached_property
+    @array_property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
         """The admissible motion of least kinetic energy per unit of CoM x and y velocity.
 
@@ -244,7 +253,13 @@ class Stance:
         its part is zero.
         """
         motions = self.energy_motions
-        return np.asarray(motions @ np.linalg.pinv(self.com_jacobian[:2] @ motions, rcond=_LOST))
+        speeds = self.com_jacobian[:2].dot(motions)
+        (a, b), (_, c) = speeds.dot(speeds.T).tolist()
+        area = a * c - b * b
+        if area > _APART * (a + c) ** 2:
+            inverse = np.array([[c, -b], [-b, a]]) / area
+            return np.asarray(motions.dot(speeds.T).dot(inverse))
+        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=_LOST))
 
     @property
     def redundant_directions(self) -> tuple[str, ...]:
@@ -260,9 +275,12 @@ class Stance:
 
     def unstack(self, forces: Float[np.ndarray, "m *p"]) -> Float[np.ndarray, "nc 6 *p"]:
         """Stacked forces (m, ...) as wrenches (nc, 6, ...), zero where a contact carries none."""
-        wrenches = np.zeros((6 * len(self.contacts), *forces.shape[1:]))
+        shape = (len(self.contacts), 6, *forces.shape[1:])
+        if len(forces) == shape[0] * 6:
+            return np.array(forces).reshape(shape)
+        wrenches = np.zeros((shape[0] * 6, *shape[2:]))
         wrenches[self._layout.places] = forces
-        return wrenches.reshape(len(self.contacts), 6, *forces.shape[1:])
+        return wrenches.reshape(shape)
 
     def in_world_axes(self, wrenches: Float[np.ndarray, "nc 6"]) -> Float[np.ndarray, "nc 6"]:
         """Wrenches given in contact axes, in world axes about the same points."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -70,12 +70,15 @@ class Sweep(LabelledResult):
         return self[str(self.attrs["coordinate"])]
 
     @property
-    def criteria(self) -> tuple[Mapping[str, Any], ...]:
-        """What was minimised, as plain data; of a policy its name alone.
+    def criteria(self) -> tuple[Criterion | str, ...]:
+        """What was minimised, as values that can be evaluated again; of a policy its name alone.
 
         Empty for a file of an earlier version, which did not record it.
         """
-        return tuple(json.loads(self.attrs.get("criteria", "[]")))
+        return tuple(
+            str(each["policy"]) if "policy" in each else Criterion.from_dict(each)
+            for each in json.loads(self.attrs.get("criteria", "[]"))
+        )
 
     @property
     def limits(self) -> Limits | None:
@@ -135,8 +138,9 @@ class Sweep(LabelledResult):
         found = self._dataset
         if criteria is not None:
             found = found.sel(criterion=list(criteria))
-            if self.criteria:
-                known = dict(zip(self.labels("criterion"), self.criteria, strict=True))
+            recorded = json.loads(self.attrs.get("criteria", "[]"))
+            if recorded:
+                known = dict(zip(self.labels("criterion"), recorded, strict=True))
                 kept = json.dumps([known[name] for name in criteria])
                 found = found.assign_attrs(criteria=kept)
         if postures is not None:

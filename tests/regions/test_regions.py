@@ -395,16 +395,16 @@ def test_a_moving_robot_meets_its_limits_there_to_first_order(grounded, criterio
         assert np.sort(slack)[1] < 1e-6
 
 
-def test_a_law_has_a_region_only_where_it_moves(grounded):
+def test_a_policy_has_a_region_only_where_it_moves(grounded):
     stance, _ = grounded("icub")
     criterion = CRITERIA["wrench"]
 
-    def law(q):
+    def policy(q):
         return copsense.solve_equilibrium(stance.at(q), criterion).wrenches
 
     with pytest.raises(InvalidInputError, match="moving=True"):
-        criterion_region(stance, law, Limits())
-    same = criterion_region(stance, law, Limits(), moving=True)
+        criterion_region(stance, policy, Limits())
+    same = criterion_region(stance, policy, Limits(), moving=True)
     other = criterion_region(stance, criterion, Limits(), moving=True)
     np.testing.assert_allclose(same.polygon, other.polygon, atol=1e-6)
 

@@ -72,7 +72,7 @@ class Case:
         if self.controller.source:
             content = controller_code(self.controller.source)
             found["controller"]["content"] = hashlib.sha256(content).hexdigest()[:12]
-        return found | {"software": _software()}
+        return found | {"software": versions(("mujoco", "pin"))}
 
     @cached_property
     def key(self) -> str:
@@ -103,7 +103,3 @@ def make_plan(
             robots, postures, conditions, named.items(), controllers
         )
     )
-
-
-def _software() -> dict[str, str]:
-    return versions(("mujoco", "pin"))

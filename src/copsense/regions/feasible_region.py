@@ -69,7 +69,7 @@ class _Problem:
         nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
         all_rows = limit_rows(stance, limits)
         rows, bound = all_rows.over_forces(LoadProblem.of(stance))
-        self.names = all_rows.names + all_rows.torque_names
+        self.names = all_rows.all_names
         E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
         self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
         self.N = scipy.linalg.null_space(E)
@@ -95,7 +95,7 @@ class _Problem:
     def _relax(self) -> None:
         """Relax the limits by what rounding takes, or report which are in conflict."""
         soft = 1.0 / self.scale
-        soft[len(self.names) :] = 0.0  # the box is no limit
+        soft[len(self.names) :] = 0.0  # the box is not one of the limits
         found = least_relaxation(self.A, self.b, soft)
         if found is None:
             raise InvalidInputError(_UNSOLVED)

@@ -37,7 +37,7 @@ def criterion_region(
 
     Args:
         stance: robot, posture and contacts.
-        criterion: what shares the load; a law q -> wrenches only if `moving`.
+        criterion: what shares the load; a policy q -> wrenches only if `moving`.
         limits: what the wrenches and torques must respect.
         moving: let the robot move its CoM itself, by the admissible motion of least kinetic energy
             (that of `CopSensitivity.com_gain`), with wrenches and torques to first order. J and
@@ -50,8 +50,8 @@ def criterion_region(
     Raises:
         UndeterminedWrenchError: several wrenches are equally good.
         UnloadedContactError: `moving`, and a contact carries no normal force.
-        InvalidInputError: a law although the posture is held, or weights or limits that do not fit
-            the stance.
+        InvalidInputError: a policy although the posture is held, or weights or limits that do not
+            fit the stance.
         UnknownNameError: a torque limit names no joint.
     """
     axes = com_axes(stance)
@@ -84,8 +84,8 @@ def _held_equilibrium(
     """Forces and torques by the CoM's position along the axes, posture held: exactly affine."""
     if not isinstance(criterion, Criterion):
         raise InvalidInputError(
-            "a law q -> wrenches gives the wrenches of a posture, not those with the CoM elsewhere "
-            "at this posture. Give a Criterion, or moving=True."
+            "a policy q -> wrenches gives the wrenches of a posture, not those with the CoM "
+            "elsewhere at this posture. Give a Criterion, or moving=True."
         )
 
     own, nb = LoadProblem.of(stance), stance.robot.base_nv

@@ -274,8 +274,9 @@ class _Problem:
         # A contact's row has no joint, and no sign.
         self.joint = np.concatenate([np.full(len(rows.bound), -1), rows.joint])
         self.sign = np.concatenate([np.zeros(len(rows.bound)), rows.sign])
-        self.names = rows.names + rows.torque_names
-        self.kinds = rows.kinds + ("torque",) * len(rows.joint)
+        # Row of the normal force under a centre of pressure; -1 for any other limit.
+        self.normal = np.concatenate([rows.normals, np.full(len(rows.joint), -1)])
+        self.names, self.kinds = rows.all_names, rows.all_kinds
         E, e = load.base_map.T, load.base_wrench
         self.program = Program(self.H, self.g, E, e, self.A, self.b, self.weight)
         self.scale = self.program.scale

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
@@ -77,12 +76,12 @@ class StaticEquilibrium:
     @property
     def unloaded(self) -> tuple[str, ...]:
         """Names of the contacts without normal force."""
-        return self._where(lambda fz: abs(fz) <= UNLOADED * self.stance.robot.weight)
+        return self._named(np.abs(self.wrenches[:, 2]) <= UNLOADED * self.stance.robot.weight)
 
     @property
     def pulling(self) -> tuple[str, ...]:
         """Names of the contacts that would have to pull: the ground cannot."""
-        return self._where(lambda fz: fz < -UNLOADED * self.stance.robot.weight)
+        return self._named(self.wrenches[:, 2] < -UNLOADED * self.stance.robot.weight)
 
     def residual(self) -> float:
         """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
@@ -121,10 +120,9 @@ class StaticEquilibrium:
         system = self._system or Kkt(self.stance, self.criterion)
         return system.derivative(self, directions)
 
-    def _where(self, test: Callable[[float], bool]) -> tuple[str, ...]:
-        normal = self.wrenches[:, 2]
+    def _named(self, those: Bool[np.ndarray, " nc"]) -> tuple[str, ...]:
         names = self.stance.contact_names
-        return tuple(name for name, fz in zip(names, normal, strict=True) if test(fz))
+        return tuple(names[k] for k in np.flatnonzero(those)) if those.any() else ()
 
 
 def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticEquilibrium:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 # Reciprocal condition number under which the KKT matrix is examined for lost directions.
 _RCOND = 1e-13
+_ALIKE = 1e-2  # rows whose largest entries differ by less need no scaling
 _NULL = 1e-10  # singular values, relative, that count as lost
 
 
@@ -76,6 +77,8 @@ class Kkt:
         scale = np.ones(len(entries))
         for _ in range(3):
             rows = scale * (entries * scale).max(axis=1)
+            if rows.min() > _ALIKE * rows.max():
+                break
             scale /= np.sqrt(np.where(rows > 0, rows, 1.0))
         self.scale = scale
         scaled = scale[:, None] * self.matrix * scale

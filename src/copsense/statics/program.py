@@ -29,6 +29,7 @@ _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
 _WELL = 1e-4  # singular values, relative, from which no column comes near to depending on others
 _ZERO = 1e-12  # norm of a row that limits nothing
+_ALIKE = 1e-2  # rows whose largest entries differ by less need no scaling
 _FAR = 1e4  # units: no x is looked for farther out
 
 
@@ -293,6 +294,8 @@ def symmetric_solver(K: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     entries, d = np.abs(K), np.ones(len(K))
     for _ in range(3):
         size = d * (entries * d).max(axis=1)
+        if size.min() > _ALIKE * size.max():
+            break
         d /= np.sqrt(np.where(size > 0, size, 1.0))
     lu, pivots, _ = scipy.linalg.lapack.dgetrf(d[:, None] * K * d)
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import platform
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from copsense._version import __version__
 from copsense.paper.closed_form import FourBar
-from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
+from copsense.paper.closed_form.between_feet import PAPER_LENGTH
+from copsense.paper.reproduce.sideways import feet_distance
 from copsense.posture import PostureCost
+from copsense.provenance import versions
 from copsense.robots import PRESETS
 from copsense.stance import Stance
 from copsense.sweeps import Sweep
@@ -56,14 +56,11 @@ def describe_parameters(
 
 def find_versions() -> dict[str, str]:
     """Of this package, Python and what it rests on."""
-    found = {
-        "copsense": __version__,
+    packages = ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models")
+    found = {name: text or "not a distribution" for name, text in versions(packages).items()}
+    return {
+        "copsense": found.pop("copsense"),
         "Python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
+        **found,
     }
-    for package in ("pin", "numpy", "scipy", "xarray", "matplotlib", "mujoco", "icub-models"):
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not a distribution"
-    return found
