@@ -172,10 +172,10 @@ def test_the_knees_of_a_quadruped_are_not_known():
 @pytest.mark.parametrize(("choice", "how"), [(C1, "left the ground"), (C2, "slipped")])
 def test_a_point_lifts_or_slips_where_the_statics_say(choice, how):
     stance = copsense.load_stance("solo12")
-    found = predict(lateral_reference(stance, Ramp(0.15)), choice.law)
+    found = predict(lateral_reference(stance, Ramp(0.15)), choice.build_criterion())
     forces = []
     for there in lateral_sweep(stance, 0.0, 0.99 * found.excursion, 3).stances:
-        wrenches = copsense.solve_equilibrium(there, choice.law).wrenches
+        wrenches = copsense.solve_equilibrium(there, choice.build_criterion()).wrenches
         mu = there.contacts[0].friction or 1.0
         tangential = np.hypot(wrenches[:, 0], wrenches[:, 1])
         forces.append([wrenches[:, 2], mu * wrenches[:, 2] - tangential])
@@ -195,12 +195,12 @@ def test_the_first_order_of_a_slip_is_that_of_the_path():
     free = [dataclasses.replace(contact, friction=None) for contact in own]
     stance = copsense.load_stance("go2", contacts=free)
     reference = lateral_reference(stance, Ramp(0.13))
-    found = predict(reference, C2.law, None, 0.7)
+    found = predict(reference, C2.build_criterion(), None, 0.7)
 
     def gaps(y):
         """What friction and load leave each foot with the CoM at y from the start."""
         there, _ = reference.path.at(y)
-        forces = copsense.solve_equilibrium(there, C2.law).wrenches
+        forces = copsense.solve_equilibrium(there, C2.build_criterion()).wrenches
         return np.append(0.7 * forces[:, 2] - np.hypot(*forces[:, :2].T), forces[:, 2])
 
     # By differences over a tenth of a millimetre, from the start alone.
@@ -210,7 +210,7 @@ def test_the_first_order_of_a_slip_is_that_of_the_path():
     there = gaps(found.excursion)
     assert there.min() == pytest.approx(0.0, abs=1e-6 * stance.robot.weight)
     assert found.contact == stance.contact_names[int(np.argmin(there)) % len(own)]
-    bare = predict(reference, C2.law, None, 1e9)
+    bare = predict(reference, C2.build_criterion(), None, 1e9)
     assert bare.excursion > found.excursion
 
 
@@ -225,9 +225,9 @@ def test_a_sway_that_is_cut_short_is_predicted_as_far_as_it_goes():
 def test_the_first_order_is_the_sensitivity_s(stance):
     reference = lateral_reference(stance, Ramp(0.05))
     for choice in (C1, C2):
-        found = predict(reference, choice.law)
+        found = predict(reference, choice.build_criterion())
         there, tangent = reference.path.at(0.0)
-        here = cop_sensitivity(there, choice.law)
+        here = cop_sensitivity(there, choice.build_criterion())
         slope = (here.gradient @ tangent)[1, 1]
         # By hand: the inner edge of the right sole, contact y = 31 mm; its slack f_z (b - a p).
         fz, left = here.equilibrium.wrenches[1, 2], 0.031 - here.cop[1, 1]
@@ -240,7 +240,7 @@ def test_the_first_order_is_the_sensitivity_s(stance):
         still = np.zeros(2)
         norm = np.linalg.norm(found.start.torques)
         assert found.torque_norm(still) == pytest.approx((norm, norm), rel=1e-6)
-        margin = 0.031 - cop_sensitivity(stance, choice.law).cop[1, 1]
+        margin = 0.031 - cop_sensitivity(stance, choice.build_criterion()).cop[1, 1]
         assert found.smallest_margin(0.0, 0.0) == pytest.approx((margin, margin), rel=1e-3)
 
 

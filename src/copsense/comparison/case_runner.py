@@ -20,36 +20,37 @@ from copsense.controllers import (
 from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
 from copsense.simulation import MujocoSimulator, Push, Recording, Scenario, rollout
 from copsense.simulation.prediction import StaticPrediction, predict
+from copsense.simulation.scenario import LONGEST
 from copsense.stance import Stance
 
-_SHORTER = 0.85  # a lean out of reach is tried again, so much shorter
+_SHORTER = 0.85  # a lean out of reach is tried again, shorter by this factor
 
 
 class CaseRunner:
-    """What the trials of `score` work with.
+    """What the trials of `scoring` work with.
 
     Args:
-        case: what to set up.
+        case: what to run.
         progress: called with the simulated time since the last call [s].
     """
 
     def __init__(self, case: Case, progress: Callable[[float], object] | None = None) -> None:
-        """Nothing is loaded before it is needed."""
+        """Store the case; everything else is loaded when first used."""
         self.case, self._progress = case, progress
-        self.criterion, self.limits = case.controller.law, case.controller.limits
+        self.criterion, self.limits = case.controller.build_criterion(), case.controller.limits
 
     @cached_property
     def stance(self) -> Stance:
-        """The robot in its posture."""
+        """The robot in the case's posture."""
         return self.case.robot.stance(self.case.posture)
 
     @cached_property
     def gains(self) -> Gains:
-        """Of the controller, and of what predicts a push."""
+        """The controller's gains, which also predict a push."""
         return self.case.controller.gains_of(self.stance.robot)
 
     def make_controller(self) -> Controller:
-        """What balances the robot, anew for each run: it may remember."""
+        """A new controller for each run: it may have memory."""
         choice = self.case.controller
         if choice.source:
             return load_controller(choice.source, self.stance)
@@ -70,10 +71,10 @@ class CaseRunner:
         push: Push | None = None,
         **changes: Any,
     ) -> Recording:
-        """One rollout in the case's conditions, with a push or changed fields on top.
+        """One run in the case's conditions, with a push or changed fields added.
 
         Raises:
-            ControllerError: the controller failed on the way, which tells nothing of the robot.
+            ControllerError: the controller failed during the run, so nothing was measured.
         """
         values = dict(self.case.conditions.values or {}) | changes
         if push is not None:
@@ -94,8 +95,8 @@ class CaseRunner:
     def lean(self, reach: float | None, speed: float, sign: float) -> tuple[PathReference, float]:
         """The reference of a lateral lean, and how far it goes [m].
 
-        Without a reach it goes until the CoM is over the outermost contact, or as far as the
-        robot can.
+        Without a reach it goes until the CoM is over the outermost contact, or as far as the robot
+        can lean.
         """
         if reach is not None:
             return lateral_reference(self.stance, Ramp(sign * reach, speed)), reach
@@ -114,20 +115,18 @@ class CaseRunner:
         return lateral_reference(self.stance, signal)
 
     def statics(self, reference: PathReference) -> tuple[StaticPrediction | None, str]:
-        """What the statics say along a reference; or nothing, and why."""
+        """The static prediction along a reference, or None and the reason."""
         try:
             return predict(reference, self.criterion, self.limits, self._friction), ""
         except CopsenseError as error:
             return None, f"no static prediction: {error}"
 
     @property
-    def _friction(self) -> float:
-        """Of the ground when a run starts."""
-        friction = self._simulator.settings.friction
-        for change in (self.case.conditions.values or {}).get("friction", ()):
-            if change.start <= 0 and change.contact is None:
-                friction = change.friction
-        return friction
+    def _friction(self) -> dict[str, float]:
+        """Of the ground under each contact when a run starts."""
+        changes = (self.case.conditions.values or {}).get("friction", ())
+        scenario = Scenario(LONGEST, friction=changes)
+        return scenario.friction_at_start(self.stance, self._simulator.settings.friction)
 
     @cached_property
     def leg_joints(self) -> tuple[str, ...]:

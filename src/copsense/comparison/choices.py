@@ -176,8 +176,7 @@ class ControllerChoice:
         """Whether anything is limited."""
         return self.limits is not None and self.limits.any
 
-    @property
-    def law(self) -> Criterion:
+    def build_criterion(self) -> Criterion:
         """The criterion with that name."""
         return criterion_named(self.criterion, self.characteristic_length)
 

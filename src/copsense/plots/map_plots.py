@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
-from copsense.maps.marginal import Marginal
+from copsense.maps.marginals import Marginal
 from copsense.plots.reading import MM
 from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
 

@@ -86,7 +86,8 @@ def balance(
     if controller is None:
         assert predicted is not None
         controller = BalancingController(stance, predicted, gains, limits=limits)
-    prediction = None if predicted is None else predict(path, predicted, limits)
+    ground = scenario.friction_at_start(stance, simulator.settings.friction)
+    prediction = None if predicted is None else predict(path, predicted, limits, ground)
     recording = rollout(
         simulator,
         controller,

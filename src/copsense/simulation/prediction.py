@@ -6,6 +6,7 @@ controller applies, so a comparison holds the theory against physics, not agains
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,6 +22,7 @@ from copsense.scan import PathScan, ScanPoint
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
 from copsense.simulation.recording import Recording
+from copsense.simulation.scenario import Scenario
 from copsense.stance import Stance
 
 # What keeps a contact in its place, but for friction, which is taken as a cone below.
@@ -154,7 +156,7 @@ def predict(
     reference: PathReference,
     criterion: Criterion,
     limits: Limits | None = None,
-    friction: float = PhysicsSettings.friction,
+    friction: float | Mapping[str, float] = PhysicsSettings.friction,
 ) -> StaticPrediction:
     """The static prediction along a reference's path, from its start at zero outwards.
 
@@ -162,7 +164,8 @@ def predict(
         reference: the path, and to which side it goes first.
         criterion: how the load is shared.
         limits: within which, if any.
-        friction: coefficient of contacts that give none.
+        friction: coefficient of contacts without one of their own; or of every contact, by name,
+            see `Scenario.friction_at_start`.
 
     Raises:
         CopsenseError: no equilibrium somewhere on the path, such as beyond the limits.
@@ -264,10 +267,12 @@ class _Gaps:
         weight: of the robot [N].
     """
 
-    def __init__(self, stance: Stance, friction: float) -> None:
+    def __init__(self, stance: Stance, friction: float | Mapping[str, float]) -> None:
         """Lay the gaps of these contacts out."""
         self.table, self.weight = margin_table(stance, _GROUND), stance.robot.weight
-        self.friction = [friction if c.friction is None else c.friction for c in stance.contacts]
+        if not isinstance(friction, Mapping):
+            friction = Scenario().friction_at_start(stance, friction)
+        self.friction = [friction[name] for name in stance.contact_names]
         self.contacts = (*self.table.where, *stance.contact_names)
         self.kinds = (*self.table.kinds, *("friction" for _ in stance.contacts))
 

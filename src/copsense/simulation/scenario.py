@@ -11,7 +11,7 @@ from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, 
 from copsense.simulation.odometry import FootOdometry
 from copsense.stance import Stance
 
-_LONGEST = 3600.0  # s
+LONGEST = 3600.0  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Scenario:
         finite_number(self.duration, "the duration of a scenario [s]", positive=True)
         finite_number(self.control_period, "the control period [s]", positive=True)
         object.__setattr__(self, "seed", whole_number(self.seed, "the seed", least=0))
-        if self.duration > _LONGEST:
+        if self.duration > LONGEST:
             raise InvalidInputError(
-                f"a scenario of {self.duration:g} s is too long. Give at most {_LONGEST:g} s."
+                f"a scenario of {self.duration:g} s is too long. Give at most {LONGEST:g} s."
             )
         pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
         object.__setattr__(self, "pushes", pushes)

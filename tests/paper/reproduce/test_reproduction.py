@@ -1,4 +1,4 @@
-"""What the iCub's claims come to, and that their verdicts follow from the numbers."""
+"""The verdicts on the iCub's claims, and that their verdicts follow from the numbers."""
 
 import numpy as np
 import pytest
