@@ -45,7 +45,7 @@ def limit_lines(row: dict[str, Any]) -> Iterator[str]:
             predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
             predicted = "met" if travel["exact"] == 0 else f"first order: {predicted}"
             yield (
-                f"CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} ({predicted})"
+                f"CoM to {side}: {travel['exact'] * 1e3 + 0.0:6.1f} mm to {travel['name']} ({predicted})"
             )
 
 

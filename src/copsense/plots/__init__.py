@@ -6,6 +6,10 @@ need several. No window is opened and no figure is kept in a global state.
 
 from __future__ import annotations
 
+from copsense.extras import require
+
+require("matplotlib", "a figure")  # before the modules that import it
+
 from copsense.plots.benchmark_plots import plot_benchmark
 from copsense.plots.cop_plots import plot_cop, plot_foot_cop
 from copsense.plots.curve_plots import (
