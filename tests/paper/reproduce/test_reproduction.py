@@ -109,7 +109,7 @@ def test_a_four_bar_of_other_size_is_not_similar(reproduction):
 
 
 def test_the_order_of_the_contacts_does_not_matter(reproduction):
-    turned = reproduction.lateral.isel(contact=[1, 0])
+    turned = copsense.Sweep(reproduction.lateral.isel(contact=[1, 0]))
     assert judged(turned) == judged(reproduction.lateral)
 
 
