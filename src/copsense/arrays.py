@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Self, TypeVar, cast, overload
+from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 
@@ -31,10 +31,12 @@ class array_property(cached_property[Array]):  # noqa: N801 (a decorator, as cac
     """
 
     @overload
-    def __get__(self, instance: None, owner: type[Any] | None = None) -> Self: ...
+    def __get__(self, instance: None, owner: type[Any] | None = None) -> array_property[Array]: ...
     @overload
     def __get__(self, instance: object, owner: type[Any] | None = None) -> Array: ...
-    def __get__(self, instance: object, owner: type[Any] | None = None) -> Self | Array:
+    def __get__(
+        self, instance: object, owner: type[Any] | None = None
+    ) -> array_property[Array] | Array:
         """The array, kept in the instance, where it is found before this is asked again."""
         if instance is None:
             return self
