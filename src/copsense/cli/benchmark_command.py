@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 from collections.abc import Iterator
@@ -17,7 +16,8 @@ from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written
 from copsense.cli.units import Unit, read_quantity
-from copsense.errors import InvalidInputError, MissingExtraError
+from copsense.errors import InvalidInputError
+from copsense.extras import require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -104,8 +104,7 @@ def benchmark(
     from copsense.comparison.benchmark_run import check_plan, finished_scores
     from copsense.files import check_output
 
-    if importlib.util.find_spec("mujoco") is None:
-        raise MissingExtraError("mujoco", "sim", "a benchmark in closed loop")
+    require("mujoco", "a benchmark in closed loop")
     # A table that is gone on with has its picture drawn anew.
     redraw = force or (output is not None and Path(output).exists())
     if picture is not None:

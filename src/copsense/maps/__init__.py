@@ -4,6 +4,10 @@
 resumes a map that was stopped. `load_map` opens the store.
 """
 
+from copsense.extras import require
+
+require("xarray", "a map")  # before the modules that import it
+
 from copsense.maps.map_plan import MapPlan
 from copsense.maps.map_statistics import CriterionSummary, FailedPosture, MapSummary, WorstPosture
 from copsense.maps.mapping import load_map, map_postures, map_summary

@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from copsense.arrays import whole_number
-from copsense.errors import CopsenseError, InvalidInputError, MissingExtraError, SchedulerError
+from copsense.errors import CopsenseError, InvalidInputError, SchedulerError
+from copsense.extras import require
 from copsense.maps.chunks import ChunkEvaluator
 from copsense.maps.map_plan import MapPlan
 from copsense.maps.store import MapStore, open_map
@@ -45,10 +46,9 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         raise InvalidInputError(
             "both a scheduler and local workers are asked for. Give one of the two."
         )
-    try:
-        import distributed
-    except ImportError:
-        raise MissingExtraError("distributed", "cluster", "a cluster") from None
+    require("distributed", "a cluster")
+    import distributed
+
     if scheduler is not None:
         _silence()
         try:

@@ -24,7 +24,8 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense._version import __version__
-from copsense.errors import CopsenseError, MissingExtraError, OutputError
+from copsense.errors import CopsenseError, OutputError
+from copsense.extras import require
 from copsense.files import check_output
 from copsense.maps.columns import (
     EVALUATED,
@@ -323,8 +324,7 @@ def _mask() -> int:
 
 
 def _zarr() -> ModuleType:
-    try:
-        import zarr
-    except ImportError:
-        raise MissingExtraError("zarr", "map", "a map") from None
+    require("zarr", "a map")
+    import zarr
+
     return zarr
