@@ -1,4 +1,4 @@
-"""Does the kernel say what the clear path says? On 10 000 random postures, gradients included.
+"""Does the kernel equal the reference? On 10 000 random postures, gradients included.
 
     python benchmarks/equality.py [--count 10000] [--jobs 2]
 
@@ -20,11 +20,12 @@ import numpy as np
 import pinocchio as pin
 
 import copsense
-from copsense.batch import BatchKernel, PostureChart, evaluation
+from copsense.batch import BatchKernel, PostureChart
+from copsense.batch.statics import batch_kernel
 from copsense.posture import supporting_joints
 
 ALLOWED = 1e-9
-WHAT = ("wrenches", "torques", "cops", "gradient", "com_gain", "com_travel")
+WHAT = ("wrenches", "torques", "cops", "gradient", "com_gain", "com_travel", "tipping_edge")
 LENGTH = 0.03  # m: how far the CoM is drawn from the stance's, either way
 TILT = 0.12  # rad: likewise the base's roll, pitch and yaw
 TURN = 0.4  # rad: likewise every joint off the limbs
@@ -109,45 +110,46 @@ def largest_error(given, expected):
     return float(np.abs(given[finite] - expected[finite]).max()) / size
 
 
-def clear_answer(stance, q, criterion):
-    """What the kernel's arrays should hold, from `cop_sensitivity`; or why there is none."""
+def reference_answer(stance, q, criterion):
+    """What the kernel's arrays should hold, from `cop_sensitivity`; or why it raises."""
     try:
-        clear = copsense.cop_sensitivity(stance.at(q), criterion)
+        expected = copsense.cop_sensitivity(stance.at(q), criterion)
     except copsense.CopsenseError as error:
         return str(error)
     return {
-        "wrenches": clear.equilibrium.wrenches,
-        "torques": clear.equilibrium.torques,
-        "cops": clear.cop,
-        "gradient": clear.gradient,
-        "com_gain": clear.com_gain,
-        "com_travel": clear.com_travel,
+        "wrenches": expected.equilibrium.wrenches,
+        "torques": expected.equilibrium.torques,
+        "cops": expected.cop,
+        "gradient": expected.gradient,
+        "com_gain": expected.com_gain,
+        "com_travel": expected.com_travel,
+        "tipping_edge": expected.tipping_edge,
     }
 
 
 def compare(name, start, count):
-    """Of one case: contacts, rows, rows that the kernel left or refused, and the errors.
+    """Of one case: contacts, rows, rows that the kernel left or that failed, and the errors.
 
     The share of a case begins at its posture `start`, so that shares differ.
     """
     stance = CASES[name]()
     q = draw(stance, start + count, seed=list(CASES).index(name))[start:]
-    criteria, left, fill = criteria_of(stance), [], evaluation.fill_row
+    criteria, left, fill = criteria_of(stance), [], batch_kernel.fill_row
 
     def counted(*arguments):
         left.append(arguments[-2:])
         return fill(*arguments)
 
-    evaluation.fill_row = counted
+    batch_kernel.fill_row = counted
     found = BatchKernel(stance, criteria).evaluate(q)
     errors = dict.fromkeys(WHAT, 0.0)
     for i, j in np.ndindex(len(q), len(criteria)):
-        clear = clear_answer(stance, q[i], criteria[j])
-        if isinstance(clear, str):
-            if found.reasons.get((i, j)) != clear:
+        expected = reference_answer(stance, q[i], criteria[j])
+        if isinstance(expected, str):
+            if found.reasons.get((i, j)) != expected:
                 errors = dict.fromkeys(WHAT, np.inf)
             continue
-        for what, value in clear.items():
+        for what, value in expected.items():
             errors[what] = max(errors[what], largest_error(getattr(found, what)[i, j], value))
     return name, len(stance.contacts), count, len(left), len(found.reasons), errors
 
@@ -171,10 +173,8 @@ def main():
     print(file=sys.stderr)
     print(f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__},")
     print(f"Pinocchio {pin.__version__}, {platform.machine()}, {platform.system()}.\n")
-    print(
-        "Largest relative difference of kernel and clear path, four criteria a posture; *left* is"
-    )
-    print("how many answers the kernel left to the clear path, *failed* how many neither has.\n")
+    print("Largest relative difference of kernel and reference, four criteria a posture; *left* is")
+    print("how many answers the kernel left to the reference, *failed* how many neither has.\n")
     head = [what.replace("_", " ") for what in WHAT]
     print(f"| case | contacts | postures | left | failed | {' | '.join(head)} |")
     print("|---" * (5 + len(WHAT)) + "|")

@@ -1,4 +1,4 @@
-"""What it costs to solve postures: charts beside the clear path, interleaved in one process.
+"""What it costs to solve postures: charts beside the reference, interleaved in one process.
 
     python benchmarks/postures.py
 
@@ -82,10 +82,10 @@ def rows():
                     COUNT,
                     *notes,
                 )
-                clear = PostureChart(chart.stance, chart.names)
-                clear.fallback_reason = "measured"
-                found["icub, com, clear path"] = (
-                    lambda clear=clear, values=values: clear.solve(values[:8]),
+                reference = PostureChart(chart.stance, chart.names)
+                reference.fallback_reason = "measured"
+                found["icub, com, reference"] = (
+                    lambda reference=reference, values=values: reference.solve(values[:8]),
                     8,
                     *notes,
                 )

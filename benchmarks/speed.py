@@ -46,6 +46,9 @@ PEERS = {"casadi": "CasADi with adam, generated C", "jax": "JAX with adam, jacre
 WHAT = ("wrenches", "torques", "cops", "gradient")
 EXACT, DIFFERENCED = 1e-9, 1e-6  # how near the kernel's answers a contender's must be
 FEET = ["l_sole", "r_sole"]
+SCRIPT = "Pinocchio + NumPy, analytic, with CoM gain and travel"
+REFERENCE = "reference path with CoM gain and travel"
+LIMITED = "reference path with CoM gain and travel, within limits"
 SHOWN = ("avx2", "fma", "avx512f", "avx512vl")
 
 
@@ -123,8 +126,17 @@ def per_posture(function: Callable[[np.ndarray], Any], q: np.ndarray) -> Callabl
     return run
 
 
-def clear_path(stance: copsense.Stance, q: np.ndarray) -> dict[str, np.ndarray]:
-    """The clear path's answer at one configuration."""
+def with_gains(
+    stance: copsense.Stance, q: np.ndarray, limits: copsense.Limits | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """CoM gains and travels of both criteria by the reference path, and all that they need."""
+    at = stance.at(q)
+    found = [copsense.cop_sensitivity(at, criterion, limits) for criterion in scaling.CRITERIA]
+    return np.array([c.com_gain for c in found]), np.array([c.com_travel for c in found])
+
+
+def reference_path(stance: copsense.Stance, q: np.ndarray) -> dict[str, np.ndarray]:
+    """The reference path's answer at one configuration."""
     at = stance.at(q)
     found = [copsense.cop_sensitivity(at, criterion) for criterion in scaling.CRITERIA]
     return {
@@ -133,6 +145,11 @@ def clear_path(stance: copsense.Stance, q: np.ndarray) -> dict[str, np.ndarray]:
         "cops": np.array([c.cop for c in found]),
         "gradient": np.array([c.gradient for c in found]),
     }
+
+
+def near_standing(stance: copsense.Stance) -> np.ndarray:
+    """Configurations along the lateral path, the CoM within 3 cm of the middle."""
+    return np.array([at.q for at in copsense.lateral_sweep(stance, -0.03, 0.03, 16).stances])
 
 
 def compare(options: argparse.Namespace, progress: Callable[[str], None]) -> dict[str, Any]:
@@ -172,9 +189,26 @@ def compare(options: argparse.Namespace, progress: Callable[[str], None]) -> dic
         answers = [contenders.gradient(function(row)) for row in q[:32]]
         wrong[name] = check(name, stacked(answers), expected, allowed)
         runs[name] = per_posture(function, q[:count])
-    name = "clear path"
-    wrong[name] = check(name, stacked([clear_path(stance, r) for r in q[:32]]), expected, EXACT)
-    runs[name] = per_posture(lambda row: clear_path(stance, row), q[:2])
+    name = "reference path"
+    answers = [reference_path(stance, row) for row in q[:32]]
+    wrong[name] = check(name, stacked(answers), expected, EXACT)
+    runs[name] = per_posture(lambda row: reference_path(stance, row), q[:16])
+    soles = [contact.sole for contact in stance.contacts]
+    script = contenders.analytic_with_gains(
+        model, FEET, [(sole.normals, sole.offsets) for sole in soles]
+    )
+    runs[SCRIPT] = per_posture(script, q[:16])
+    runs[REFERENCE] = per_posture(lambda row: with_gains(stance, row), q[:16])
+    # Only postures that have an equilibrium within the limits: near standing.
+    limits, near = copsense.Limits(torque="model"), near_standing(stance)
+    runs[LIMITED] = per_posture(lambda row: with_gains(stance, row, limits), near)
+    pairs = [zip(script(row), with_gains(stance, row), strict=True) for row in q[:16]]
+    wrong[REFERENCE] = wrong[LIMITED] = 0.0
+    wrong[SCRIPT] = max(
+        float(np.abs(a - b).max() / np.abs(b).max()) for pair in pairs for a, b in pair
+    )
+    if not wrong[SCRIPT] <= EXACT:
+        raise SystemExit(f"{SCRIPT} differs from the reference path by {wrong[SCRIPT]:.1e}.")
     notes = {}
     if options.peers:
         peers = Peers(q[:32], stance.robot.joint_names, model.gravity.linear)
@@ -240,6 +274,12 @@ def requirements(found: dict[str, Any], medians: dict[str, float]) -> list[str]:
             met = "met by one of the two"
         text = f"{middle:.1f}x (of the least times {least:.1f}x)"
         rows.append(f"| {name}: at least {wanted}x | {text} | {met} |")
+    for name, most in ((REFERENCE, 2), (LIMITED, 4)):
+        middle = statistics.median(times[name]) / statistics.median(times[SCRIPT])
+        least = min(times[name]) / min(times[SCRIPT])
+        met = "met" if max(middle, least) <= most else "not met"
+        text = f"{middle:.1f}x (of the least times {least:.1f}x)"
+        rows.append(f"| {name}: at most {most}x of {SCRIPT} | {text} | {met} |")
     middle, least = statistics.median(kernel) * 1e6, min(kernel) * 1e6
     met = "met" if middle <= 3 else "not met"
     rows.append(f"| 3 us or better a posture | {middle:.2f} us (least {least:.2f}) | {met} |")

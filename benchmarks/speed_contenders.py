@@ -2,7 +2,8 @@
 
 Plain Pinocchio and NumPy, each written as cheaply as we know. Each is a function of a configuration
 that returns, for minimum wrench (L = 1 m) and minimum torque: wrenches (2, 12), torques (2, n),
-CoPs (2, 4), their sensitivities along the columns of Z (2, 4, p), and Z (nv, p).
+CoPs (2, 4), their sensitivities along the columns of Z (2, 4, p), and Z (nv, p). `analytic` adds
+the loads' sensitivities (2, 2, p).
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ def finite_differences(
 
 
 def analytic(model: pin.Model, frames: list[str]) -> Callable[[np.ndarray], tuple[np.ndarray, ...]]:
-    """Pinocchio's derivatives, and one adjoint solve for the four CoP coordinates of a criterion.
+    """Pinocchio's derivatives, and one adjoint solve for a criterion's four CoPs and two loads.
 
     With A = d(G - J' f)/dq at fixed f and D = d(J nu)/dq at fixed nu, nu = (y, tau):
 
@@ -134,18 +135,19 @@ def analytic(model: pin.Model, frames: list[str]) -> Callable[[np.ndarray], tupl
         Jb, Jj = J[:, :6], J[:, 6:]
         p, torques = cops(f), Gj - f @ Jj
         Z = tangents(J)
-        eta = np.empty((2, 4, Z.shape[1]))
+        eta, loads = np.empty((2, 4, Z.shape[1])), np.empty((2, 2, Z.shape[1]))
         for c in range(2):
             nu = np.concatenate([y[c], torques[c] if c else still[6:]])
             A, D = derivatives(q, f[c], nu)
             # dp = (-dm_y - p_x df_z, dm_x - p_y df_z) / f_z
-            C = np.zeros((12, 4))
+            C = np.zeros((12, 6))
             for k in (0, 1):
+                C[6 * k + 2, 4 + k] = 1.0  # the loads
                 share = 1.0 / f[c, 6 * k + 2]
                 C[6 * k + 4, 2 * k], C[6 * k + 3, 2 * k + 1] = -share, share
                 C[6 * k + 2, 2 * k : 2 * k + 2] = -share * p[c, 2 * k : 2 * k + 2]
             if c:
-                right = np.zeros((18, 4))
+                right = np.zeros((18, 6))
                 right[:12] = C
                 u = np.linalg.solve(at.K, right)  # symmetric: its own adjoint
                 g = u[12:].T @ A[:6] - u[:12].T @ (D + Jj @ A[6:])
@@ -153,15 +155,47 @@ def analytic(model: pin.Model, frames: list[str]) -> Callable[[np.ndarray], tupl
                 # df = D dq + J_b (J_b' J_b)^-1 (A_b - J_b' D) dq
                 u = np.linalg.solve(Jb.T @ Jb, Jb.T @ C)
                 g = u.T @ A[:6] + (C - Jb @ u).T @ D
-            eta[c] = g @ Z
-        return f, torques, p, eta, Z
+            both = g @ Z
+            eta[c], loads[c] = both[:4], both[4:]
+        return f, torques, p, eta, Z, loads
 
     return evaluate
 
 
+def analytic_with_gains(
+    model: pin.Model, frames: list[str], soles: list[tuple[np.ndarray, np.ndarray]]
+) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """The same with CoM gains (2, 2, 2, 2) and travels (2, 2), for the reference path.
+
+    The motion of least kinetic energy per unit of CoM velocity, then the slack of every edge, with
+    outward normals a and offsets b of each sole: s = w (b - a p), ds = (b - a p) dw - w a dp. The
+    load's rate takes another adjoint, so that the wrenches' derivatives along Z are solved for.
+    """
+    evaluate, data = analytic(model, frames), model.createData()
+    weight = pin.computeTotalMass(model) * np.linalg.norm(model.gravity.linear)
+
+    def extended(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        f, _, p, eta, Z, loads = evaluate(q)
+        M = pin.crba(model, data, q, pin.Convention.WORLD)
+        Jc = pin.jacobianCenterOfMass(model, data, q)[:2] @ Z
+        S = np.linalg.solve(Z.T @ M @ Z, Jc.T)
+        motion = S @ np.linalg.inv(Jc @ S)
+        gains = (eta @ motion).reshape(2, 2, 2, 2)
+        shares, rates = f.reshape(2, 2, 6)[:, :, 2] / weight, loads @ motion / weight
+        travel = np.empty((2, 2))
+        for c in range(2):
+            for k, (a, b) in enumerate(soles):
+                margin = b - a @ p[c, 2 * k : 2 * k + 2]
+                rate = margin[:, None] * rates[c, k] - shares[c, k] * (a @ gains[c, k])
+                travel[c, k] = (shares[c, k] * margin / np.hypot(rate[:, 0], rate[:, 1])).min()
+        return gains, travel
+
+    return extended
+
+
 def gradient(answer: tuple[np.ndarray, ...]) -> dict[str, Any]:
     """An answer in the kernel's shapes, the sensitivities as projected gradients."""
-    f, torques, p, eta, Z = answer
+    f, torques, p, eta, Z = answer[:5]
     return {
         "wrenches": f.reshape(2, 2, 6),
         "torques": torques,

@@ -14,6 +14,7 @@ path = copsense.lateral_sweep(stance, -0.07, 0.07, 57)  # world y of the CoM [m]
 criteria = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 data = copsense.sweep(path, criteria)
 
+print(data)
 figure = plot_results(data)
 
 # %%
@@ -21,7 +22,7 @@ figure = plot_results(data)
 
 middle = data.isel(posture=28)
 slopes = middle["cop_slope"].sel(contact="l_sole", axis="y")
-for criterion in data["criterion"].values:
+for criterion in data.labels("criterion"):
     print(f"{criterion}: dCoP_y/dCoM_y = {float(slopes.sel(criterion=criterion)):.3f}")
 
 assert abs(float(slopes.sel(criterion="minimum-wrench")) - 0.995) < 0.001
@@ -30,10 +31,9 @@ assert abs(float(slopes.sel(criterion="minimum-torque")) - 0.506) < 0.001
 # %%
 # And over which range does every centre of pressure stay in its sole?
 
-inside = (data["margin"] > 0).all("contact")
-for criterion in data["criterion"].values:
-    reach = data["com_y"].values[inside.sel(criterion=criterion)]
-    print(f"{criterion}: planted from {reach.min():+.3f} m to {reach.max():+.3f} m")
+for criterion, reach in data.planted_range.items():
+    assert reach is not None
+    print(f"{criterion}: planted from {reach[0]:+.3f} m to {reach[1]:+.3f} m")
 
 # %%
 # The same posture gives another sensitivity along another coordinate. Per radian of the left hip's

@@ -29,7 +29,7 @@ NO_LIMIT = "none within the path"  # a score's first limit where the path ends b
 _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
 _AT_BOUND = 1e-2  # of a parameter's logarithm: the search's resolution
-_SIMPLEX = (0.5, 0.1)  # first steps of the searches, in steps of the grid
+_SIMPLEX = (0.5, 0.1, 0.02)  # first steps of the searches, in steps of the grid
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
@@ -113,7 +113,7 @@ def design_criterion(
 ) -> Design:
     """Choose the parameters of a family that do best along a path.
 
-    A grid over the parameters, then a wide and a narrow simplex search from the best point.
+    A grid over the parameters, then ever narrower simplex searches from the best point.
 
     Args:
         path: postures to either side of its middle one, such as a lateral sweep.
@@ -224,7 +224,7 @@ def _search(
             bounds=list(zip(low, high, strict=True)),
             options={
                 "initial_simplex": np.vstack([where, where + np.diag(inwards)]),
-                "xatol": 1e-2,
+                "xatol": 1e-3,
                 "fatol": 1e-6,
                 "maxfev": 40 * len(axes),
             },

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 import numpy as np
 
 from copsense.errors import InvalidInputError
+from copsense.extras import require
 from copsense.files import check_output, file_at, write_beside
 
 if TYPE_CHECKING:
@@ -171,6 +172,7 @@ class LabelledResult:
 
 def write_netcdf(dataset: xr.Dataset, path: Path) -> None:
     """Write a dataset as compressed netCDF; truth values, which it lacks, as bytes 0 and 1."""
+    require("netCDF4", "writing netCDF")
     encoding = {
         str(name): {"zlib": True, "complevel": 4}
         for name, variable in dataset.data_vars.items()
@@ -186,6 +188,7 @@ def read_netcdf(path: Path, remedy: str) -> xr.Dataset:
     Raises:
         InvalidInputError: there is no such file, or it is not netCDF; the message ends in `remedy`.
     """
+    require("netCDF4", "reading netCDF")
     import xarray as xr
 
     if not file_at(path):
@@ -213,6 +216,7 @@ def tidy_table(
         others: variables; one with further dimensions has a column for each of their labels,
             ``cop_x``. One that the dataset lacks is left out, as is a column that stands already.
     """
+    require("pandas", "a table")
     import pandas as pd
 
     shape = tuple(dataset.sizes[d] for d in rows)

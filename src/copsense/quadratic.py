@@ -58,6 +58,14 @@ class Quadratic:
         """
         if not self.inertia:
             return self.torque
+        return self._weighed(problem, np.eye(len(self.torque)))
+
+    def _weighed(
+        self, problem: LoadProblem, columns: Float[np.ndarray, "n k"]
+    ) -> Float[np.ndarray, "n k"]:
+        """W_tau times some columns."""
+        if not self.inertia:
+            return np.asarray(self.torque.dot(columns))
         M = problem.joint_inertia
         factor, info = lapack.dpotrf(M)
         size = np.abs(M).sum(axis=0).max()
@@ -66,8 +74,8 @@ class Quadratic:
                 "a weight that follows the inertia needs every joint to move some mass when limits "
                 "are on, and for control. Give constant weights instead."
             )
-        inverse = np.triu(lapack.dpotri(factor)[0])
-        return np.asarray(self.torque + self.inertia * (inverse + np.triu(inverse, 1).T))
+        found = self.inertia * lapack.dpotrs(factor, columns)[0]
+        return np.asarray(found + self.torque.dot(columns) if self._has_constant else found)
 
     def over_forces(
         self, problem: LoadProblem
@@ -81,7 +89,7 @@ class Quadratic:
         # Matrices this small are multiplied with `dot`: it takes half the time of `@`.
         A = weighted = problem.joint_map
         if not self._plain:
-            weighted = self.torque_weight(problem).dot(A)
+            weighted = self._weighed(problem, A)
         H, g = A.T.dot(weighted), weighted.T.dot(problem.torque_offset)
         return (H + self.wrench, g + self.pull) if self.has_wrench else (H, g)
 
@@ -119,6 +127,10 @@ class Quadratic:
         inner[nb:] = np.linalg.solve(M, torques)
         moved = stance.inertia_derivative(inner)[nb:]
         return np.asarray(-self.inertia * np.linalg.solve(M, moved))
+
+    @cached_property
+    def _has_constant(self) -> bool:
+        return bool(self.torque.any())
 
     @cached_property
     def _plain(self) -> bool:

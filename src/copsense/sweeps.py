@@ -11,6 +11,7 @@ import numpy as np
 
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
+from copsense.extras import require
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits
 from copsense.path import PosturePath
@@ -251,6 +252,7 @@ def sweep(
         InvalidInputError: there is no criterion, two have one name, or a policy is given with
             limits, within which only a criterion can be solved.
     """
+    require("xarray", "a sweep")
     names = _names(criteria, limits)
     rows = SweepRows(path.stances[0], len(path), names)
     for i, here in enumerate(path.stances):

@@ -1,4 +1,4 @@
-"""``copsense map``: what it prints, writes and refuses."""
+"""``copsense map``: what it prints, writes and rejects."""
 
 import importlib.util
 import signal
@@ -9,7 +9,9 @@ import pytest
 from support.commands import copsense as run
 
 import copsense
-from copsense.maps import load_map, mapping
+from copsense.cli.map_command import read_axes
+from copsense.maps import load_map
+from copsense.maps.chunks import ChunkEvaluator
 
 GRID = ("map", "icub", "--over", "com_y=-0.05:0.05:9", "--over", "roll=-4:4:5", "--over")
 TWO = ("--over", "com_y=0:1:3", "--over", "com_z=0:1:3")
@@ -39,6 +41,12 @@ def test_the_summary_is_json_and_angles_were_degrees(made):
     assert (folder / "m.png").stat().st_size > 10_000
 
 
+def test_ranges_may_name_their_units(icub):
+    length, angle = read_axes(icub, ("com_y=-50mm:5cm:3", "roll=-4:0.1rad"))
+    assert (length.start, length.stop, length.count) == (-0.05, 0.05, 3)
+    assert (angle.start, angle.stop, angle.count) == (pytest.approx(np.radians(-4)), 0.1, None)
+
+
 def test_the_same_command_again_only_tells_and_draws(made):
     folder, _ = made
     before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
@@ -56,7 +64,7 @@ def test_other_parameters_are_one_line_with_what_differs(made):
 
 def test_stopping_says_how_to_go_on(tmp_path):
     path = tmp_path / "m.zarr"
-    plain, calls = mapping.write_chunk, []
+    plain, calls = ChunkEvaluator.fill, []
 
     def write(*arguments):
         if len(calls) == 2:
@@ -64,7 +72,7 @@ def test_stopping_says_how_to_go_on(tmp_path):
         calls.append(arguments)
         plain(*arguments)
 
-    with patch.object(mapping, "write_chunk", write):
+    with patch.object(ChunkEvaluator, "fill", write):
         answer = run(*COMMAND[:-2], "--output", path)
     assert answer.code == 130
     assert "stopped: 80 of 135 postures" in answer.err
@@ -79,6 +87,8 @@ def test_stopping_says_how_to_go_on(tmp_path):
         (("--over", "com_y=0:1:2:3"), "NAME=START:STOP:COUNT"),
         (("--over", "com_y=0:1:2.5"), "NAME=START:STOP:COUNT"),
         (("--over", "com_y=0:1"), "needs a count"),
+        (("--over", "com_y=0:1deg:3"), "'1deg' is not understood"),
+        (("--over", "roll=0:1mm:3"), "'1mm' is not understood"),
         (("--over", "com_y=0:1:3", "--samples", "5"), "takes no count"),
         (("--over", "com_y=0:1", "--samples", "0"), "from 1"),
         (("--over", "elbow=0:1:3"), "Valid: com_x"),
@@ -101,7 +111,7 @@ def test_what_is_not_understood_is_one_line(arguments, word, tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
-def test_postures_lost_are_told_with_the_remedy_and_the_reason(tmp_path):
+def test_lost_postures_are_reported_with_remedy_and_reason(tmp_path):
     ranges = ("--over", "com_x=-0.06:0.06:5", "--over", "com_y=-0.06:0.06:5")
     answer = run("map", "icub", *ranges, "--output", tmp_path / "m.zarr")
     assert answer.code == 1
@@ -115,7 +125,7 @@ def test_points_alone_have_no_travel_to_be_the_least(tmp_path):
     outputs = ("--output", tmp_path / "m.zarr", "--plot", tmp_path / "m.png")
     answer = run("map", "solo12", *ranges, "--criterion", "minimum-torque", *outputs)
     assert answer.code == 0, answer.err
-    assert "CoM travel: without end" in answer.out
+    assert "CoM travel: unlimited" in answer.out
     assert "inf" not in answer.out
 
 

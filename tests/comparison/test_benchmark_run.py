@@ -135,7 +135,7 @@ def test_a_killed_command_is_taken_up_again(whole, replayed, tmp_path):
         assert process.returncode == code, said
         assert 0 < load_benchmark(table)["key"].nunique() < len(plan())
         if how == signal.SIGINT:
-            assert "the same command goes on" in said
+            assert "the same command runs the others" in said
             assert "Traceback" not in said
     run_benchmark(plan(), table)
     assert table.read_bytes() == whole[0].read_bytes()

@@ -95,7 +95,7 @@ def test_a_scheduler_that_does_not_answer_is_one_error_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_tls_address_is_no_scheduler_either(icub, both, sample, tmp_path):
+def test_a_tls_address_is_not_a_scheduler_either(icub, both, sample, tmp_path):
     with pytest.raises(SchedulerError, match=r"no Dask scheduler answers at tls://127\.0\.0\.1:9"):
         copsense.map_postures(
             icub, sample, both, tmp_path / "m.zarr", scheduler="tls://127.0.0.1:9"

@@ -10,7 +10,7 @@ import copsense
 from copsense.batch import PostureChart
 from copsense.errors import CopsenseError
 from copsense.maps import Axis, Grid, Sample
-from copsense.maps.reach import height_advice
+from copsense.maps.heights import height_advice
 
 
 def _grid_of(ranges):
@@ -21,10 +21,10 @@ def _sample_of(ranges):
     return Sample(tuple(Axis(n, *r) for n, r in ranges.items()), 81)
 
 
-NEAR = 2e-6  # float32 against the clear path
+NEAR = 2e-6  # float32 against the reference
 
 
-def test_rows_are_those_of_the_clear_path(whole, icub, both, sample):
+def test_rows_are_those_of_the_reference(whole, icub, both, sample):
     dataset = copsense.load_map(whole[0])
     postures = PostureChart(icub, sample.names).solve(sample.values(0, len(sample)))
     rows = np.flatnonzero(postures.converged)[:: len(sample) // 12]
@@ -113,7 +113,7 @@ def test_a_map_resumed_or_cut_among_threads_is_the_same_bits(
     assert vars(found) | {"path": ""} == vars(whole[1]) | {"path": ""}
 
 
-def test_a_chunk_without_its_mark_is_evaluated_anew(icub, both, sample, whole, tmp_path, same):
+def test_a_chunk_without_its_mark_is_evaluated_again(icub, both, sample, whole, tmp_path, same):
     import shutil
 
     import zarr
@@ -175,7 +175,7 @@ def test_feet_and_joints_are_coordinates_too(icub, both, tmp_path):
     assert found.criteria["minimum-torque"].counts["evaluated"] == 9
 
 
-def test_what_does_not_fit_is_refused_and_leaves_nothing(icub, both, sample, tmp_path):
+def test_what_does_not_fit_is_rejected_and_leaves_nothing(icub, both, sample, tmp_path):
     path = tmp_path / "m.zarr"
     bad = Grid((Axis("com_q", 0.0, 1.0, 2),))
     for arguments, word in [
@@ -191,7 +191,7 @@ def test_what_does_not_fit_is_refused_and_leaves_nothing(icub, both, sample, tmp
 
 
 @pytest.mark.parametrize("make", [_grid_of, _sample_of])
-def test_lost_for_its_height_a_map_is_told_the_height_that_has_its_postures(icub, make):
+def test_lost_for_its_height_a_map_has_a_note_on_the_height_to_map_over(icub, make):
     wide = {"com_x": (-0.06, 0.06), "com_y": (-0.06, 0.06)}
     advice = height_advice(icub, make(wide))
     low, high = map(float, re.search(r"com_z=([\d.]+):([\d.]+)", advice).groups())

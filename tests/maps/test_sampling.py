@@ -67,6 +67,6 @@ def test_a_grid_meets_both_ends_and_runs_its_last_axis_fastest():
         (lambda: Sample(AXES, 5, seed=-1), "seed"),
     ],
 )
-def test_what_is_no_sampling_is_refused(make, word):
+def test_what_is_not_a_sampling_is_rejected(make, word):
     with pytest.raises(CopsenseError, match=word):
         make()

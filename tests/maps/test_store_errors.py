@@ -10,17 +10,19 @@ import zarr
 import copsense
 from copsense.errors import OutputError
 from copsense.maps import Sample
+from copsense.maps.store import open_map
 
 
 def _snapshot(path):
     return {p: p.read_bytes() for p in path.rglob("*") if p.is_file()}
 
 
-def test_other_parameters_are_refused_with_what_differs(whole, icub, both, sample):
+def test_other_parameters_are_rejected_with_what_differs(whole, icub, both, sample):
     before = _snapshot(whole[0])
     other = Sample(sample.axes, len(sample), seed=4)
     for changed, word in [
         ({"sampling": other}, r"sampling.seed is 3 there, 4 here"),
+        ({"sampling": Sample(sample.axes, 300, seed=3 + 2**70)}, r"sampling.seed is 3 there"),
         ({"chunk": 64}, r"chunk is 32 there, 64 here"),
         ({"limits": copsense.Limits()}, r"limits is null there"),
         ({"criteria": both[:1]}, r'criteria is \["minimum-wrench", "minimum-torque"\] there'),
@@ -33,7 +35,7 @@ def test_other_parameters_are_refused_with_what_differs(whole, icub, both, sampl
     assert _snapshot(whole[0]) == before
 
 
-def test_another_robot_or_posture_is_refused(whole, icub, both, sample, stance_of):
+def test_another_robot_or_posture_is_rejected(whole, icub, both, sample, stance_of):
     moved = copsense.load_stance("icub", posture={"torso_yaw": 0.1})
     with pytest.raises(OutputError, match=r"configuration\["):
         copsense.map_postures(moved, sample, both, whole[0], chunk=32)
@@ -46,8 +48,13 @@ def test_another_robot_or_posture_is_refused(whole, icub, both, sample, stance_o
         )
 
 
+def test_a_store_holds_its_criteria(whole, both):
+    stored = open_map(whole[0]).parameters["criteria"]
+    assert [copsense.Criterion.from_dict(c) for c in stored] == both
+
+
 @pytest.mark.parametrize("what", ["file", "folder", "zarr", "broken"])
-def test_what_is_no_map_is_refused_and_kept(what, icub, both, sample, tmp_path):
+def test_what_is_not_a_map_is_rejected_and_kept(what, icub, both, sample, tmp_path):
     path = tmp_path / "m.zarr"
     if what == "file":
         path.write_text("precious")
@@ -60,7 +67,7 @@ def test_what_is_no_map_is_refused_and_kept(what, icub, both, sample, tmp_path):
         path.mkdir()
         (path / "zarr.json").write_text("{")
     before = _snapshot(tmp_path)
-    with pytest.raises(OutputError, match="is no map of copsense"):
+    with pytest.raises(OutputError, match="is not a map of copsense"):
         copsense.map_postures(icub, sample, both, path)
     assert _snapshot(tmp_path) == before
 
@@ -71,9 +78,9 @@ def test_a_store_that_a_future_version_made_says_so(whole, icub, both, sample, t
     path = tmp_path / "m.zarr"
     shutil.copytree(whole[0], path)
     group = zarr.open_group(path, mode="r+")
-    parameters = json.loads(group.attrs["copsense_map"]) | {"layout": 99}
+    parameters = json.loads(group.attrs["copsense_map"]) | {"format": 99}
     group.attrs["copsense_map"] = json.dumps(parameters)
-    with pytest.raises(OutputError, match="layout is 99 there, 1 here"):
+    with pytest.raises(OutputError, match="format is 99 there, 2 here"):
         copsense.map_postures(icub, sample, both, path, chunk=32)
 
 

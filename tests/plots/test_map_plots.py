@@ -120,7 +120,7 @@ def test_a_skeleton_ends_on_the_contacts(icub):
     assert len(lines) == len(icub.robot.joint_names) + 2
 
 
-def test_what_cannot_be_drawn_is_refused(whole):
+def test_what_cannot_be_drawn_is_rejected(whole):
     dataset = load_map(whole[0])
     with pytest.raises(copsense.CopsenseError, match="Valid: com_y, com_z, roll"):
         marginal(dataset, ("com_y", "yaw"))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from copsense.analysis.limit_lines import clipped, limit_lines
+from copsense.extras import require
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,6 +67,7 @@ def html(data: dict[str, Any], joint_unit: Unit) -> str:
 
 def table(data: dict[str, Any]) -> pd.DataFrame:
     """A row per criterion and contact, vectors as a column per component."""
+    require("pandas", "a table")
     import pandas as pd
 
     axes = {

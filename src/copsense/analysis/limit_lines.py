@@ -44,9 +44,8 @@ def limit_lines(row: dict[str, Any]) -> Iterator[str]:
             first = travel["first_order"]
             predicted = f"{first * 1e3:.1f}" if math.isfinite(first) else "never"
             predicted = "met" if travel["exact"] == 0 else f"first order: {predicted}"
-            yield (
-                f"CoM to {side}: {travel['exact'] * 1e3:6.1f} mm to {travel['name']} ({predicted})"
-            )
+            distance = travel["exact"] * 1e3 + 0.0  # no minus before a zero
+            yield f"CoM to {side}: {distance:6.1f} mm to {travel['name']} ({predicted})"
 
 
 def _named(active: list[dict[str, Any]]) -> list[str]:

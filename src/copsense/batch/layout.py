@@ -1,4 +1,4 @@
-"""Layout: a robot and its contacts as the flat arrays that a kernel reads.
+"""RobotLayout: a robot and its contacts as the flat arrays that a kernel reads.
 
 No posture enters here, so a layout is made once. Bodies are numbered as their joints: 0 is the
 base, i the link that joint i moves; velocity i of the joints is column 5 + i.
@@ -6,6 +6,7 @@ base, i the link that joint i moves; velocity i of the joints is column 5 + i.
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -96,7 +97,7 @@ class Feet(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class RobotLayout:
     """What a kernel needs to know of a robot and its contacts."""
 
     tree: Tree
@@ -108,7 +109,7 @@ class Layout:
         return self.tree, self.feet
 
 
-def not_covered(robot: Robot, contacts: tuple[Contact, ...]) -> str:
+def why_not_covered(robot: Robot, contacts: tuple[Contact, ...]) -> str:
     """Why the kernel does not serve this robot on these contacts; empty where it does."""
     model = robot.model
     if model.joints[1].shortname() != "JointModelFreeFlyer":
@@ -123,13 +124,15 @@ def not_covered(robot: Robot, contacts: tuple[Contact, ...]) -> str:
         return f"there are {len(contacts)} contacts"
     if len(contacts) == 2 and all(contact.kind == "point" for contact in contacts):
         return "two points cannot hold a robot"
+    if importlib.util.find_spec("numba") is None:
+        return 'Numba is not installed (pip install "copsense[fast]")'
     return ""
 
 
-def layout(stance: Stance, edges: list[np.ndarray]) -> Layout:
+def robot_layout(stance: Stance, edges: list[np.ndarray]) -> RobotLayout:
     """The layout of a robot on its contacts; `edges` holds each sole's half-planes (e, 3)."""
     turns = _axis_frames(stance.robot.model)
-    return Layout(_tree(stance.robot, turns), _feet(stance, turns, edges))
+    return RobotLayout(_tree(stance.robot, turns), _feet(stance, turns, edges))
 
 
 def _kind(joint: pin.JointModel) -> int | None:

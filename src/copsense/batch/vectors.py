@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from copsense.batch.lanes import Value, compiled, floor, load, magnitude, store, where_less
+from copsense.batch.compiler import compiled
+from copsense.batch.lanes import Value, floor, load, magnitude, store, where_less
 
 Vector = tuple[Any, Any, Any]
 

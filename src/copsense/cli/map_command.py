@@ -12,6 +12,7 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 @click.command(
     "map",
     epilog="Example: copsense map icub --over com_y=-0.05:0.05:101 --over com_z=0.47:0.5:61 "
-    "--output icub.zarr --plot icub.png. The same command goes on with a map that was stopped.",
+    "--output icub.zarr --plot icub.png. The same command resumes a map that was stopped.",
 )
 @stance_options
 @criterion_options
@@ -33,10 +34,10 @@ if TYPE_CHECKING:
     metavar="NAME=START:STOP[:COUNT]",
     help="A coordinate and its range, absolute, world axes: com_x, com_y, com_z, base_x, base_y, "
     "base_z [m]; roll, pitch, yaw or a joint [deg; m if prismatic]; CONTACT:x, CONTACT:y [m], "
-    "CONTACT:yaw [deg]. With COUNT a grid. Repeatable.",
+    "CONTACT:yaw [deg]. Other units may be named: -30mm:30mm. With COUNT a grid. Repeatable.",
 )
 @click.option("--samples", type=int, metavar="N", help="A quasi-random sample instead of a grid.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the sample.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the sample.")
 @click.option(
     "--sequence",
     type=click.Choice(["sobol", "halton"]),
@@ -58,21 +59,23 @@ if TYPE_CHECKING:
     metavar="N",
     help="Postures that are evaluated, written and resumed as one.",
 )
-@click.option("--threads", type=int, default=1, show_default=True, help="Chunks at a time.")
+@click.option(
+    "--threads", type=int, default=1, show_default=True, help="Chunks evaluated at a time."
+)
 @click.option(
     "--scheduler",
     metavar="tcp://HOST:PORT",
     help="Evaluate on the workers of this Dask scheduler; they must see the output.",
 )
 @click.option("--local", type=int, metavar="N", help="Evaluate on N Dask workers started here.")
-@click.option("--plot", type=click.Path(), metavar="FILE", help="Draw it: .png, .svg or .pdf.")
+@click.option("--plot", type=click.Path(), metavar="FILE", help="Draw the map: .png, .svg or .pdf.")
 @click.option("--plot-over", metavar="NAME,NAME", help="Coordinates to draw over; default first 2.")
 @click.option(
     "--marginal",
     type=click.Choice(["worst", "median"]),
     default="worst",
     show_default=True,
-    help="What the picture shows of the coordinates not drawn over.",
+    help="How the picture reduces the coordinates not drawn over.",
 )
 @click.option("--force", is_flag=True, help="Overwrite the picture; a store is never overwritten.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
@@ -107,11 +110,11 @@ def map_command(
     from copsense.batch import BatchKernel
     from copsense.files import check_output
     from copsense.maps import MapPlan
+    from copsense.maps.heights import height_advice
+    from copsense.maps.map_statistics import summarise
     from copsense.maps.mapping import fill_map
-    from copsense.maps.reach import height_advice
     from copsense.maps.sampling import sampling_of
     from copsense.maps.store import check_store
-    from copsense.maps.summary import summarise
 
     check_store(output)
     if plot is not None:
@@ -150,7 +153,7 @@ def map_command(
         except KeyboardInterrupt:
             click.echo(
                 f"\nstopped: {done} of {len(sampling)} postures are in {output}. Run the same "
-                "command again to go on.",
+                "command again to resume.",
                 err=True,
             )
             click.get_current_context().exit(130)
@@ -166,7 +169,7 @@ def map_command(
 
 
 def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:
-    """``NAME=START:STOP[:COUNT]`` options; degrees become radians."""
+    """``NAME=START:STOP[:COUNT]`` options, in SI; a bare number is in metres or degrees."""
     from copsense.batch import PostureChart
     from copsense.maps import Axis
 
@@ -175,24 +178,22 @@ def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:
         name, _, numbers = text.partition("=")
         try:
             start, stop, *count = numbers.split(":")
-            low, high = float(start), float(stop)
             if len(count) > 1:
                 raise ValueError
             points = int(count[0]) if count else None
         except ValueError:
             raise InvalidInputError(
                 f"{text!r} is not understood. Give NAME=START:STOP:COUNT, such as "
-                "com_y=-0.03:0.03:41, or NAME=START:STOP with --samples."
+                "com_y=-0.03:0.03:41 or com_y=-30mm:30mm:41, or NAME=START:STOP with --samples."
             ) from None
         if name in ranges:
             raise InvalidInputError(f"--over names {name} twice. Give each coordinate once.")
-        ranges[name] = low, high, points
-    chart = PostureChart(stance, tuple(ranges))
-    found = []
-    for (name, (low, high, points)), unit in zip(ranges.items(), chart.units, strict=True):
-        factor = math.pi / 180 if unit == "rad" else 1.0
-        found.append(Axis(name, low * factor, high * factor, points))
-    return found
+        ranges[name] = start, stop, points
+    units = PostureChart(stance, tuple(ranges)).units
+    return [
+        Axis(name, read_quantity(start, unit), read_quantity(stop, unit), points)
+        for (name, (start, stop, points)), unit in zip(ranges.items(), units, strict=True)
+    ]
 
 
 def _pair(text: str | None, known: tuple[str, ...]) -> tuple[str, str] | None:
@@ -240,7 +241,7 @@ def _draw(
 
 
 def _failures(summary: MapSummary) -> int:
-    kinds = ("unreachable", "refused", "unsolved")
+    kinds = ("unreachable", "rejected", "unsolved")
     return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
 
 
@@ -271,19 +272,19 @@ def _print(summary: MapSummary, plot: str | None) -> None:
     over = ", ".join(summary.coordinates)
     click.echo(f"{summary.robot}: {summary.postures} postures over {over}")
     units = dict(zip(summary.coordinates, summary.units, strict=True))
-    told: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
+    printed: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
     for name, row in summary.criteria.items():
         shares = ", ".join(
             f"{count / summary.postures:.1%} {kind}" for kind, count in row.counts.items() if count
         )
         click.echo(f"  {name}: {shares}")
         for status, first in row.failed.items():
-            if (status, first.posture) not in told:
+            if (status, first.posture) not in printed:
                 reason = first.reason.removeprefix(f"{status}: ")
                 click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
-            told.add((status, first.posture))
+            printed.add((status, first.posture))
         if row.worst_travel and math.isinf(row.worst_travel[0].value):
-            click.echo("    CoM travel: without end, no contact can tip")
+            click.echo("    CoM travel: unlimited, no contact can tip")
         elif row.worst_travel:
             worst = row.worst_travel[0]
             middle = row.travel_percentiles[50.0]

@@ -7,6 +7,10 @@ it compares theory with physics. Falls are scored only within limits, as a rate 
 repeats: without limits they depend on chance more than on the criterion.
 """
 
+from copsense.extras import require
+
+require("pandas", "a benchmark")  # before the modules that import it
+
 from copsense.comparison.benchmark_run import run_benchmark, run_case
 from copsense.comparison.case import Case, make_plan
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, get_args, get_type_hints
 
-from copsense.errors import InvalidInputError, MissingExtraError, UnknownNameError
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.extras import require
 
 # What msgspec calls the types that TOML can hold -> what a reader of the file calls them.
 _WORDS = {
@@ -34,10 +35,9 @@ def structure(value: object, kind: Any, name: str = "") -> Any:
         InvalidInputError: a value is of another type or is rejected by its dataclass; the message
             names the field.
     """
-    try:
-        import msgspec
-    except ImportError:
-        raise MissingExtraError("msgspec", "sim", "reading a plan") from None
+    require("msgspec", "reading a plan")
+    import msgspec
+
     _check_names(value, kind)
     try:
         return msgspec.convert(value, kind)

@@ -1,8 +1,8 @@
 """Cluster: a plan's chunks on the workers of Dask Distributed.
 
 Workers get the plan once, and after that numbers of chunks; they write into the store themselves,
-and nothing but numbers comes back. A chunk that is evaluated twice, because its worker died before
-it could say so, is written twice with the same bits.
+and only numbers come back. A chunk that is evaluated twice, because its worker died before it could
+report it, is written twice with the same bits.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from pathlib import Path
 from typing import Any
 
 from copsense.arrays import whole_number
-from copsense.errors import CopsenseError, InvalidInputError, MissingExtraError, SchedulerError
-from copsense.maps.evaluation import ChunkEvaluator
-from copsense.maps.plan import MapPlan
+from copsense.errors import CopsenseError, InvalidInputError, SchedulerError
+from copsense.extras import require
+from copsense.maps.chunks import ChunkEvaluator
+from copsense.maps.map_plan import MapPlan
 from copsense.maps.store import MapStore, open_map
-from copsense.maps.writing import write_chunk
 
 _TIMEOUT = 5.0  # s for a scheduler to answer
 _PATIENCE = 60.0  # s for the first worker to join
-# A terminal's Ctrl-C goes to the workers too, which would only be loud about it.
-_DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+# A terminal's Ctrl-C goes to the workers too, which would print tracebacks.
+_IGNORE_INTERRUPT = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 _AHEAD = 4  # chunks that are sent out for each thread of the workers
 
 
@@ -46,10 +46,9 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         raise InvalidInputError(
             "both a scheduler and local workers are asked for. Give one of the two."
         )
-    try:
-        import distributed
-    except ImportError:
-        raise MissingExtraError("distributed", "cluster", "a cluster") from None
+    require("distributed", "a cluster")
+    import distributed
+
     if scheduler is not None:
         _silence()
         try:
@@ -57,7 +56,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             with ThreadPoolExecutor(1) as thread:
                 thread.submit(asyncio.run, _answer(scheduler)).result()
             client = distributed.Client(scheduler, timeout=_TIMEOUT)
-        except Exception as error:  # whatever an address makes of itself
+        except Exception as error:  # Dask raises many kinds for a wrong address
             late = f"no answer within {_TIMEOUT:g} s"
             raise SchedulerError(
                 f"no Dask scheduler answers at {scheduler} ({str(error) or late}). Start one "
@@ -77,7 +76,7 @@ def connect(scheduler: str | None, workers: int | None) -> Iterator[Any]:
             host="127.0.0.1",
             dashboard_address=None,
             silence_logs=logging.CRITICAL,
-            preload=_DEAF,
+            preload=_IGNORE_INTERRUPT,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
@@ -96,23 +95,23 @@ def _await_worker(client: Any) -> None:
 
 
 def _silence() -> None:
-    """The error says it all; Dask gives loggers inside its own levels of their own."""
+    """Only the error is shown; Dask sets the levels of its inner loggers one by one."""
     for name in ["distributed", *logging.root.manager.loggerDict]:
         if name.partition(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 async def _answer(scheduler: str) -> None:
-    """Ask a scheduler who it is: a client that finds nobody takes its time, and is loud."""
+    """Ask for the scheduler's identity: without one, a client is slow to fail and logs much."""
     import distributed
 
     async with distributed.rpc(scheduler) as there:
         who = await asyncio.wait_for(there.identity(), _TIMEOUT)
     if who.get("type") != "Scheduler":
-        raise ValueError(f"a {who.get('type')} is there")
+        raise ValueError(f"a {who.get('type')} answered")
 
 
-def evaluate_there(
+def evaluate_on_workers(
     client: Any,
     plan: MapPlan,
     store: MapStore,
@@ -122,14 +121,14 @@ def evaluate_there(
     """Have the workers evaluate these chunks and write them into the store.
 
     Raises:
-        SchedulerError: a worker cannot take part or does not see the store, workers died over the
+        SchedulerError: a worker lacks a package or does not see the store, workers died over the
             same chunk, or the scheduler is gone.
         OutputError: a worker cannot write the store.
     """
     import distributed
 
     run, remaining = uuid.uuid4().hex, iter(pending)
-    # A task of its own: were the worker that holds it to die, another would make it again.
+    # A task of its own: if the worker that holds it dies, another makes it again.
     package = client.submit(
         pickle.loads, pickle.dumps(pickle.dumps(plan)), key=f"copsense-plan-{run}"
     )
@@ -161,12 +160,12 @@ def evaluate_there(
         if client.status != "running":
             raise SchedulerError(
                 f"the scheduler at {client.scheduler.address} is gone. The chunks that are done "
-                "are kept; start it and its workers, and run the same again to go on."
+                "are kept; start it and its workers, and run the same again to resume."
             ) from None
         raise SchedulerError(
-            f"the workers could not go on ({type(error).__name__}: {str(error)[:300]}). They need "
+            f"the workers failed ({type(error).__name__}: {str(error)[:300]}). They need "
             f"copsense with the same version and extras as here, and the folder {store.path}. The "
-            "chunks that are done are kept; run the same again to go on."
+            "chunks that are done are kept; run the same again to resume."
         ) from None
     finally:
         client.cancel([*first, package])
@@ -184,7 +183,7 @@ def evaluate_chunk(package: bytes, path: str, index: int) -> int:
             "writes. Give --output on a file system that all workers share, under the same path."
         )
     evaluator, store = _prepared(package, path)
-    write_chunk(evaluator, store, index)
+    evaluator.fill(store, index)
     start, stop = evaluator.plan.bounds(index)
     return stop - start
 

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from copsense.batch import PostureChart
-from copsense.maps.plan import MapPlan
+from copsense.maps.map_plan import MapPlan
 from copsense.margins import MarginTable, margin_table
 from copsense.sweep_layout import variable_name
 
-EVALUATED, UNREACHABLE, REFUSED, INFEASIBLE, UNSOLVED = range(5)
-# What became of a posture under a criterion, by its code in the column `status`.
-STATUS = ("evaluated", "unreachable", "refused", "infeasible", "unsolved")
+EVALUATED, UNREACHABLE, REJECTED, INFEASIBLE, UNSOLVED = range(5)
+# How a posture was evaluated under a criterion, by its code in the column `status`.
+STATUS = ("evaluated", "unreachable", "rejected", "infeasible", "unsolved")
 PENDING = 255  # not visited yet
+
+Chunk = dict[str, np.ndarray]  # columns of a stretch of postures, by name
 
 _EACH = ("posture", "criterion")
 
@@ -38,7 +40,7 @@ class Column:
 
 
 _COLUMNS = {
-    "status": Column(_EACH, "uint8", "", "what became of the posture; see flag_meanings"),
+    "status": Column(_EACH, "uint8", "", "how the posture was evaluated; see flag_meanings"),
     "reason": Column(_EACH, "str", "", "why it was not evaluated; empty if it was"),
     "least_com_travel": Column(
         _EACH,
@@ -86,7 +88,7 @@ _LIMIT_MARGIN = Column(
     "float32",
     "m (cop), N m (torque, torsion), N (others)",
     "smallest distance of the criterion's own wrenches to the limits of each kind; negative where "
-    "the limits would clip them",
+    "they break the limits",
 )
 _CONFIGURATION = Column(
     ("posture", "configuration_index"),
@@ -108,7 +110,7 @@ def coordinate_columns(plan: MapPlan) -> dict[str, Column]:
 
 
 def columns(plan: MapPlan) -> dict[str, Column]:
-    """Every column that is written posture by posture, the coordinates first."""
+    """Every column with a value for each posture, the coordinates first."""
     found = coordinate_columns(plan) | _COLUMNS
     if plan.limits is not None:
         found["limit_margin"] = _LIMIT_MARGIN
@@ -118,7 +120,7 @@ def columns(plan: MapPlan) -> dict[str, Column]:
 
 
 def labels(plan: MapPlan) -> dict[str, tuple[str, ...]]:
-    """What stands along each dimension but the postures'."""
+    """Labels along each dimension but the postures'."""
     found = {
         "criterion": tuple(c.name for c in plan.criteria),
         "contact": plan.stance.contact_names,
@@ -139,5 +141,5 @@ def limit_kinds(table: MarginTable) -> tuple[str, ...]:
 
 
 def fill_value(column: Column) -> Any:
-    """What an array holds where nothing was written yet."""
+    """What an array holds where it is not written."""
     return {"str": "", "uint8": PENDING, "int16": -1, "int64": -1}.get(column.dtype, np.nan)

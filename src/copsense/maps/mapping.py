@@ -1,4 +1,4 @@
-"""Mapping: evaluate a plan's chunks here or on a cluster, and go on where it was stopped."""
+"""Mapping: evaluate the chunks of a plan, here or on a cluster; resume what was stopped."""
 
 from __future__ import annotations
 
@@ -7,21 +7,23 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from copsense.arrays import whole_number
 from copsense.criterion import Criterion
 from copsense.limits import Limits
-from copsense.maps.cluster import connect, evaluate_there
-from copsense.maps.evaluation import ChunkEvaluator
-from copsense.maps.plan import MapPlan
+from copsense.maps.chunks import ChunkEvaluator
+from copsense.maps.cluster import connect, evaluate_on_workers
+from copsense.maps.map_plan import MapPlan
+from copsense.maps.map_statistics import MapSummary, summarise
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore, check_store, create_map, open_map
-from copsense.maps.summary import MapSummary, summarise
-from copsense.maps.writing import write_chunk
 from copsense.stance import Stance
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Progress = Callable[[int], object]
 
@@ -43,17 +45,17 @@ def map_postures(
     """Evaluate criteria over a space of postures, into a Zarr store at `path`.
 
     The store grows chunk by chunk, and memory does not grow with the number of postures. Called
-    again with the same arguments it goes on where it was stopped; the numbers are the same bits,
-    however often it was stopped and whoever evaluated the chunks. A posture that cannot be reached,
-    or whose wrenches break the limits, is a row with its status and its reason.
+    again with the same arguments it resumes where it was stopped; the numbers are the same bits,
+    however often it was stopped and wherever the chunks were evaluated. A posture that cannot be
+    reached, or whose wrenches break the limits, is a row with its status and its reason.
 
     Args:
         stance: robot, contacts, and what the coordinates not named keep.
         sampling: a `Grid` or a `Sample` over coordinates of `copsense.batch.PostureChart`.
         criteria: of distinct names.
         path: of the store, ending in ``.zarr``; its folder must exist.
-        limits: asked of every posture by the QP, which takes milliseconds each; travels, gains
-            and margins remain those of the criterion's own wrenches.
+        limits: the QP solves for wrenches within them at every posture, which takes milliseconds
+            each; travels, gains and margins remain those of the criterion's own wrenches.
         chunk: postures that are evaluated, written and resumed as one.
         configurations: store the configurations too.
         threads: chunks that are evaluated at a time.
@@ -71,7 +73,7 @@ def map_postures(
         UnknownNameError: a coordinate or a joint that does not exist.
         OutputError: `path` holds something else, a map of other parameters (the message says what
             differs), or cannot be written.
-        SchedulerError: the scheduler or its workers cannot be reached, or gave up.
+        SchedulerError: the scheduler or its workers cannot be reached, or failed.
         MissingExtraError: Zarr or Dask is not installed.
     """
     store = fill_map(
@@ -94,7 +96,7 @@ def fill_map(
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> MapStore:
-    """Evaluate what is missing of a plan's map; see `map_postures`."""
+    """Evaluate the chunks of a plan that are missing in its store; see `map_postures`."""
     threads = whole_number(threads, "threads")
     where = check_store(path)
     evaluator = ChunkEvaluator(plan)
@@ -105,19 +107,19 @@ def fill_map(
     else:
         with connect(scheduler, workers) as client:
             store = create_map(where, plan)
-            evaluate_there(client, plan, store, _pending(plan, store, report), report)
+            evaluate_on_workers(client, plan, store, _pending(plan, store, report), report)
     return store
 
 
 def map_summary(path: str | Path, progress: Progress | None = None) -> MapSummary:
-    """What the map at a path comes to, as far as it is done.
+    """Summarise the map at a path, as far as it is done.
 
     Args:
         path: of the store.
         progress: called with the number of postures read since; each is read twice.
 
     Raises:
-        OutputError: there is no map of copsense.
+        OutputError: nothing is at the path, or it is not a map of copsense.
     """
     return summarise(open_map(path), progress)
 
@@ -129,9 +131,11 @@ def load_map(path: str | Path) -> xr.Dataset:
     with the coordinates' names gives each its own dimension.
 
     Raises:
-        OutputError: there is no map of copsense.
+        OutputError: nothing is at the path, or it is not a map of copsense.
     """
-    open_map(path)  # refuses what is none
+    import xarray as xr
+
+    open_map(path)  # checks what is there
     return xr.open_zarr(Path(path), chunks=None)
 
 
@@ -150,7 +154,7 @@ def _evaluate_here(
     plan, remaining = evaluator.plan, iter(pending)
 
     def run(index: int) -> int:
-        write_chunk(evaluator, store, index)
+        evaluator.fill(store, index)
         return _size(plan, index)
 
     with ThreadPoolExecutor(threads) if threads > 1 else nullcontext() as pool:

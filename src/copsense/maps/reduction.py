@@ -1,4 +1,4 @@
-"""Reduction: what a map comes to, folded from parts that each chunk leaves behind.
+"""Reduction: counts and worst postures of a map, folded from the parts of its chunks.
 
 A chunk's part depends on that chunk alone, and parts are folded in the order of the chunks. So a
 map that was stopped, resumed, or shared among machines reduces to the same bits.
@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.maps.columns import EVALUATED, STATUS
-from copsense.maps.evaluation import Chunk
+from copsense.maps.columns import EVALUATED, STATUS, Chunk
 
 WORST = 10  # postures of each chunk, and of the map, that are kept by name
 _HALF = 1 << 16  # values of half a key

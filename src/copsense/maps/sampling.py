@@ -10,7 +10,6 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from copsense.arrays import finite_number, whole_number
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -37,7 +36,7 @@ class Axis:
     count: int | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no range."""
+        """Validate the range."""
         start = finite_number(self.start, f"the start of {self.name}")
         stop = finite_number(self.stop, f"the end of {self.name}")
         count = self.count
@@ -108,7 +107,7 @@ class Grid(_Axes):
     axes: tuple[Axis, ...]
 
     def __post_init__(self) -> None:
-        """Refuse an axis that is named twice or not counted."""
+        """Validate the axes: distinct names, each with a count."""
         self._check(counted=True)
         if math.prod(self.shape) > _MOST:
             raise InvalidInputError(
@@ -151,7 +150,7 @@ class Sample(_Axes):
     sequence: Literal["sobol", "halton"] = "sobol"
 
     def __post_init__(self) -> None:
-        """Refuse a counted axis, and numbers that are none."""
+        """Validate the axes, without counts, and the numbers."""
         self._check(counted=False)
         if self.sequence not in _SEQUENCES:
             raise UnknownNameError("low-discrepancy sequence", self.sequence, _SEQUENCES)
@@ -175,6 +174,8 @@ class Sample(_Axes):
         return np.asarray(low + unit * (high - low))
 
     def _halton(self, start: int, stop: int) -> Float[np.ndarray, "N k"]:
+        from scipy.stats import qmc
+
         engine = qmc.Halton(len(self.axes), scramble=False)
         return np.asarray(engine.fast_forward(start).random(stop - start))
 
@@ -189,6 +190,8 @@ class Sample(_Axes):
     @cached_property
     def _powers(self) -> list[np.ndarray]:
         """Sobol points number 1, 2, 4, ... times 2^bits (k,); points before them are skipped."""
+        from scipy.stats import qmc
+
         engine, found = qmc.Sobol(len(self.axes), scramble=False, bits=_BITS), []
         for b in range(max(len(self) - 1, 1).bit_length()):
             skipped = 2**b - engine.num_generated

@@ -1,8 +1,8 @@
 """Store: a map on disk, a Zarr group that `xarray.open_zarr` opens, written chunk by chunk.
 
 Layout (Zarr format 3). Each column is an array whose first dimension is ``posture``; a chunk of the
-map is one Zarr chunk of every column, so that nobody writes into another's files. ``done`` has one
-entry for each chunk, written last: a chunk without it is evaluated anew. The group ``parts`` holds
+map is one Zarr chunk of every column, so that every file has one writer. ``done`` has one entry for
+each chunk, written last: a chunk without it is evaluated again. The group ``parts`` holds
 what each chunk contributes to the reductions. The root's attributes hold the parameters.
 """
 
@@ -24,20 +24,21 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense._version import __version__
-from copsense.errors import CopsenseError, MissingExtraError, OutputError
+from copsense.errors import CopsenseError, OutputError
+from copsense.extras import require
 from copsense.files import check_output
 from copsense.maps.columns import (
     EVALUATED,
     PENDING,
     STATUS,
+    Chunk,
     Column,
     columns,
     coordinate_columns,
     fill_value,
     labels,
 )
-from copsense.maps.evaluation import Chunk
-from copsense.maps.plan import MapPlan
+from copsense.maps.map_plan import MapPlan
 from copsense.maps.reduction import QUANTITIES, WORST, Part
 from copsense.provenance import differences, digest, worded
 
@@ -56,7 +57,7 @@ class MapStore:
     """
 
     def __init__(self, path: Path, group: Any) -> None:
-        """Take hold of an open group; use `open_map` or `create_map`."""
+        """Wrap an open group; use `open_map` or `create_map`."""
         self.path, self._group = path, group
         self.parameters = map_parameters(group.attrs)
         self.coordinates: tuple[str, ...] = tuple(group.attrs["over"])
@@ -154,7 +155,7 @@ class MapStore:
             raise OutputError(
                 f"the map {self.path} cannot {verb}: {reason}. The chunks that are done are kept; "
                 f"{'free some space' if full else 'make it accessible'}, and run the same again "
-                "to go on."
+                "to resume."
             ) from None
 
 
@@ -187,28 +188,28 @@ def open_map(path: str | Path) -> MapStore:
     """Open a map to read it, or to write more chunks.
 
     Raises:
-        OutputError: nothing is there, or no map of this version of copsense.
+        OutputError: nothing is there, or it is not a map of this version of copsense.
     """
     zarr, path = _zarr(), Path(path)
-    no_map = f"{str(path)[:300]} is no map of copsense"
+    not_a_map = f"{str(path)[:300]} is not a map of copsense"
     remedy = "It was not touched. Give another path, such as map.zarr."
     try:
         if not path.exists():
             raise OutputError(f"there is no map at {path}. Make one with: copsense map ROBOT ...")
         if not (path / "zarr.json").is_file():
-            raise OutputError(f"{no_map}: it has no zarr.json. {remedy}")
+            raise OutputError(f"{not_a_map}: it has no zarr.json. {remedy}")
         group = zarr.open_group(path, mode="r+", zarr_format=3)
         if _PARAMETERS not in group.attrs:
-            raise OutputError(f"{no_map}: what made it left no parameters. {remedy}")
+            raise OutputError(f"{not_a_map}: it has no parameters. {remedy}")
         return MapStore(path, group)
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, CopsenseError):
             raise
-        raise OutputError(f"{no_map} that can be read: {error}. {remedy}") from None
+        raise OutputError(f"{not_a_map} that can be read: {error}. {remedy}") from None
 
 
 def create_map(path: Path, plan: MapPlan) -> MapStore:
-    """Make an empty store beside its place and move it there, whole; or open what is there.
+    """Make an empty store under another name and rename it when whole; or open what is there.
 
     Raises:
         OutputError: the store that is there is of another plan; or none can be made.
@@ -225,7 +226,7 @@ def create_map(path: Path, plan: MapPlan) -> MapStore:
         finally:
             shutil.rmtree(made, ignore_errors=True)
     except OSError as error:
-        if path.exists():  # somebody was faster
+        if path.exists():  # another process was faster
             return _resumed(path, parameters)
         raise OutputError(
             f"{str(path)[:300]!r} cannot be written: {error.strerror or error}. Free some space, "
@@ -240,7 +241,7 @@ def _resumed(path: Path, parameters: dict[str, Any]) -> MapStore:
     if found:
         raise OutputError(
             f"{path} is a map of other parameters: {worded(found)}. It was not touched. Give the "
-            "same parameters to go on with it, or another path."
+            "same parameters to resume it, or another path."
         )
     return store
 
@@ -311,7 +312,7 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
     add(parts, "worst", Column(dims, "int64", "", "the worst postures"), (1, nq, nk, WORST))
     add(parts, "values", Column(dims, "float32", "", "the quantity there"), (1, nq, nk, WORST))
     with warnings.catch_warnings():
-        # Not of the specification yet; readers that do not know it read array by array.
+        # Not part of the specification yet; other readers read array by array.
         warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
         zarr.consolidate_metadata(path)
 
@@ -323,8 +324,7 @@ def _mask() -> int:
 
 
 def _zarr() -> ModuleType:
-    try:
-        import zarr
-    except ImportError:
-        raise MissingExtraError("zarr", "map", "a map") from None
+    require("zarr", "a map")
+    import zarr
+
     return zarr

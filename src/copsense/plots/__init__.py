@@ -1,10 +1,14 @@
 """Figures of results; they draw and compute nothing.
 
-Functions take a sweep (or what `cop_sensitivity` gives) and return Axes, or a Figure where they
-need several. No window is opened and no figure is kept in a global state.
+Functions take results (a `Sweep`, a `Recording`, a `Design`, what `cop_sensitivity` gives) and
+return Axes, or a Figure where they draw several. They open no window and keep no global state.
 """
 
 from __future__ import annotations
+
+from copsense.extras import require
+
+require("matplotlib", "a figure")  # before the modules that import it
 
 from copsense.plots.benchmark_plots import plot_benchmark
 from copsense.plots.cop_plots import plot_cop, plot_foot_cop

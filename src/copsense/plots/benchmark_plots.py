@@ -32,7 +32,7 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
     groups = [
         (key, rows)
         for key, rows in table.groupby(["trial", "score"], sort=False)
-        if not (rows["status"] == "none").all()  # as point feet have no margin
+        if not (rows["status"] == "none").all()  # point feet have no margin
     ]
     top = math.ceil(len(compared) / _ACROSS)
     tall = [_height(rows, colour) for _, rows in groups]
@@ -165,7 +165,7 @@ def _draw_bars(
         range(len(settings)),
         [", ".join((r, p, c) if several else (r, p)) for r, p, c in settings],
     )
-    ax.set_ylim(room - 0.5, -0.5)  # panels side by side have bars alike
+    ax.set_ylim(room - 0.5, -0.5)  # the same bar width in panels side by side
     least = float(known.min(initial=0.0))
     ax.set_xlim(min(0.0, 1.08 * least), 1.12 * longest)
     ax.grid(visible=False, axis="y")

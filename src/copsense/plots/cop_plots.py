@@ -32,27 +32,25 @@ from copsense.sweeps import Sweep
 
 
 @styled
-def plot_cop(
-    dataset: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: bool = True
-) -> Axes:
+def plot_cop(sweep: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw where each CoP is in the world while the path is followed.
 
     Each sole is a band between its two edges; the line is dotted where a CoP is off its sole or its
     contact would have to pull. The CoM is drawn beside them.
 
     Args:
-        dataset: a sweep.
+        sweep: the sweep.
         axis: ``"x"`` or ``"y"`` of the world.
         ax: where to draw; default a new figure.
-        legend: whether to say which colour is which criterion.
+        legend: whether to add a legend of the criteria.
     """
     ax = axes_or_new(ax)
-    x, index = abscissa(dataset), "xy".index(axis)
-    names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
-    colour, cops, good = colours(names), world_cops(dataset)[..., index], dataset.planted.values
-    pulling = dataset["pulling"].values.astype(bool)
-    _draw_edges(ax, dataset, axis, contacts)
-    com = dataset["com"].sel(com_axis=axis).values * MM
+    x, index = abscissa(sweep), "xy".index(axis)
+    names, contacts = labels(sweep, "criterion"), labels(sweep, "contact")
+    colour, cops, good = colours(names), world_cops(sweep)[..., index], sweep.planted.values
+    pulling = sweep["pulling"].values.astype(bool)
+    _draw_edges(ax, sweep, axis, contacts)
+    com = sweep["com"].sel(com_axis=axis).values * MM
     ax.plot(x.values, com, **COM_LINE)
     for j, name in enumerate(names):
         for k in range(len(contacts)):
@@ -64,23 +62,23 @@ def plot_cop(
                 x.values,
                 np.where(good[:, j, k], line, np.nan),
                 color=colour[name],
-                **marks(dataset),
+                **marks(sweep),
             )
-    mark_failed(ax, dataset, colour)
-    _limit(ax, dataset, axis, cops, com)
+    mark_failed(ax, sweep, colour)
+    _limit(ax, sweep, axis, cops, com)
     ax.set_xlabel(x.label)
     ax.set_ylabel(f"CoP {axis}, world [mm]")
     if legend:
         com_line = Line2D([], [], label="CoM", **COM_LINE)
         off = Line2D([], [], color=MUTED, label="off its sole", **OFF_SOLE)
-        extra = [com_line] if np.all(good | dataset.failed.values[..., None]) else [com_line, off]
+        extra = [com_line] if np.all(good | sweep.failed.values[..., None]) else [com_line, off]
         add_legend(ax, colour, extra=extra)
     return ax
 
 
 @styled
 def plot_foot_cop(
-    dataset: Sweep,
+    sweep: Sweep,
     contact: str,
     *,
     axis: str = "y",
@@ -90,23 +88,23 @@ def plot_foot_cop(
     """Draw one contact's CoP in its own axes, with the sole's edges as dotted lines.
 
     Args:
-        dataset: a sweep.
+        sweep: the sweep.
         contact: the contact's name.
         axis: ``"x"`` or ``"y"`` of the contact.
         against: a coordinate over postures to have along the horizontal axis; default the path's.
         ax: where to draw; default a new figure.
     """
     ax = axes_or_new(ax)
-    x, names = abscissa(dataset, against), labels(dataset, "criterion")
-    colour, k = colours(names), labels(dataset, "contact").index(contact)
-    found = edges(dataset, axis)[k]
+    x, names = abscissa(sweep, against), labels(sweep, "criterion")
+    colour, k = colours(names), labels(sweep, "contact").index(contact)
+    found = edges(sweep, axis)[k]
     for edge in found or ():
-        place = edge - contact_origins(dataset)[k]["xy".index(axis)]
+        place = edge - contact_origins(sweep)[k]["xy".index(axis)]
         ax.axhline(place, **EDGE_LINE)
     for name in names:
-        cop = dataset["cop"].sel(criterion=name, contact=contact, axis=axis).values * MM
-        ax.plot(x.values, cop, color=colour[name], **marks(dataset))
-    mark_failed(ax, dataset, colour, against)
+        cop = sweep["cop"].sel(criterion=name, contact=contact, axis=axis).values * MM
+        ax.plot(x.values, cop, color=colour[name], **marks(sweep))
+    mark_failed(ax, sweep, colour, against)
     ax.set_xlabel(x.label)
     ax.set_ylabel(f"CoP {axis} of {contact} [mm]")
     edge_line = Line2D([], [], label="edge of the sole", **EDGE_LINE)
@@ -114,12 +112,12 @@ def plot_foot_cop(
     return ax
 
 
-def _draw_edges(ax: Axes, dataset: Sweep, axis: str, contacts: Sequence[str]) -> None:
+def _draw_edges(ax: Axes, sweep: Sweep, axis: str, contacts: Sequence[str]) -> None:
     """Each sole as a band between its edges; a contact without one as its name alone."""
     at: dict[float, list[str]] = {}
-    for k, found in enumerate(edges(dataset, axis)):
+    for k, found in enumerate(edges(sweep, axis)):
         if found is None:
-            middle = float(contact_origins(dataset)[k, "xy".index(axis)])
+            middle = float(contact_origins(sweep)[k, "xy".index(axis)])
         else:
             ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
             for edge in found:
@@ -140,10 +138,10 @@ def _draw_edges(ax: Axes, dataset: Sweep, axis: str, contacts: Sequence[str]) ->
         )
 
 
-def _limit(ax: Axes, dataset: Sweep, axis: str, cops: np.ndarray, com: np.ndarray) -> None:
-    """Keep a CoP that diverges from pressing everything else flat."""
-    bounds = [e for e in edges(dataset, axis) if e is not None]
-    places = contact_origins(dataset)[:, "xy".index(axis)]
+def _limit(ax: Axes, sweep: Sweep, axis: str, cops: np.ndarray, com: np.ndarray) -> None:
+    """Set the limits so that a CoP that diverges does not flatten everything else."""
+    bounds = [e for e in edges(sweep, axis) if e is not None]
+    places = contact_origins(sweep)[:, "xy".index(axis)]
     marks = np.concatenate([np.ravel(bounds), places, com[np.isfinite(com)]])
     span = max(float(np.ptp(marks)), 1.0)
     shown = cops[np.isfinite(cops)]

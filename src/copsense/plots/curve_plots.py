@@ -24,22 +24,22 @@ _TALL = 6.0  # how many times the least criterion's travel is shown
 
 
 @styled
-def plot_load(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_load(sweep: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw each contact's share of the weight, f_z / (m g)."""
     ax = axes_or_new(ax)
-    share = dataset["wrench"].sel(component="fz").values / dataset.attrs["weight"]
-    _draw_per_contact(ax, dataset, share, legend=legend)
+    share = sweep["wrench"].sel(component="fz").values / sweep.attrs["weight"]
+    _draw_per_contact(ax, sweep, share, legend=legend)
     ax.axhline(0.0, color=MUTED, linewidth=0.8)
     ax.set_ylabel("load share, $f_z/(m g)$")
     return ax
 
 
 @styled
-def plot_margin(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_margin(sweep: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw how far inside its sole each CoP is."""
     ax = axes_or_new(ax)
-    margin = dataset["margin"].values * MM
-    _draw_per_contact(ax, dataset, np.where(np.isfinite(margin), margin, np.nan), legend=legend)
+    margin = sweep["margin"].values * MM
+    _draw_per_contact(ax, sweep, np.where(np.isfinite(margin), margin, np.nan), legend=legend)
     shade_below_zero(ax, margin, "off the sole")
     if not np.any(np.isfinite(margin)):
         say(ax, "no contact has a sole: none can tip")
@@ -48,17 +48,17 @@ def plot_margin(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) 
 
 
 @styled
-def plot_travel(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_travel(sweep: Sweep, *, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw how far the CoM may go before the first contact tips or unloads, to first order."""
     ax = axes_or_new(ax)
-    x, names = abscissa(dataset), labels(dataset, "criterion")
-    colour, travel = colours(names), first_to_go(dataset)
+    x, names = abscissa(sweep), labels(sweep, "criterion")
+    colour, travel = colours(names), first_to_go(sweep)
     for j, name in enumerate(names):
-        ax.plot(x.values, travel[:, j], color=colour[name], **marks(dataset))
-    mark_failed(ax, dataset, colour)
+        ax.plot(x.values, travel[:, j], color=colour[name], **marks(sweep))
+    mark_failed(ax, sweep, colour)
     _keep_readable(ax, colour, travel)
     shade_below_zero(ax, travel, "a contact tips or pulls")
-    blind = str(dataset.attrs.get("without_sole", ""))
+    blind = str(sweep.attrs.get("without_sole", ""))
     if blind:
         say(ax, f"no sole known under {blind}:\nthe travel to unloading, not to tipping")
     elif not np.any(np.isfinite(travel)):
@@ -71,42 +71,42 @@ def plot_travel(dataset: Sweep, *, ax: Axes | None = None, legend: bool = True) 
 
 
 @styled
-def plot_sensitivity(dataset: Sweep, *, axis: str = "y") -> Figure:
+def plot_sensitivity(sweep: Sweep, *, axis: str = "y") -> Figure:
     """Draw the sensitivity: the CoP's slope along the path, and its gain per CoM travel."""
     figure = new_figure(9.2, 3.7)
     left, right = figure.subplots(1, 2)
-    unit = str(dataset[str(dataset.attrs["coordinate"])].attrs.get("units", "1"))
-    # m per unit of the path: of metres per metre nothing is left, m/rad read as mm/deg
+    unit = str(sweep[str(sweep.attrs["coordinate"])].attrs.get("units", "1"))
+    # slopes in m per unit of the path: m/m stays, m/rad is shown as mm/deg
     scale = {"m": 1.0, "rad": MM * np.pi / 180.0}.get(unit, MM)
     words = {"m": "m/m", "rad": "mm/deg"}.get(unit, "mm per posture")
-    slope = dataset["cop_slope"].sel(axis=axis).values * scale
-    gain = dataset["cop_gain"].sel(axis=axis, com_direction=axis).values
-    _draw_per_contact(left, dataset, slope, legend=True)
-    _draw_per_contact(right, dataset, gain, legend=True)
+    slope = sweep["cop_slope"].sel(axis=axis).values * scale
+    gain = sweep["cop_gain"].sel(axis=axis, com_direction=axis).values
+    _draw_per_contact(left, sweep, slope, legend=True)
+    _draw_per_contact(right, sweep, gain, legend=True)
     left.set_ylabel(f"slope of CoP {axis} along the path [{words}]")
     right.set_ylabel(f"gain dCoP$_{axis}$/dCoM$_{axis}$ [m/m]")
     return figure
 
 
 @styled
-def plot_torques(dataset: Sweep) -> Figure:
+def plot_torques(sweep: Sweep) -> Figure:
     """Draw the norm of the torques along the path, and the range of each joint's torque."""
-    names, joints = labels(dataset, "criterion"), labels(dataset, "joint")
+    names, joints = labels(sweep, "criterion"), labels(sweep, "joint")
     figure = new_figure(9.2, max(3.4, 0.24 * len(joints) + 1.0))
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.15))
-    x, colour, torque = abscissa(dataset), colours(names), dataset["torque"].values
+    x, colour, torque = abscissa(sweep), colours(names), sweep["torque"].values
     height = 0.8 / len(names)
     for j, name in enumerate(names):
         norm = np.linalg.norm(torque[:, j], axis=-1)
-        left.plot(x.values, norm, color=colour[name], **marks(dataset))
+        left.plot(x.values, norm, color=colour[name], **marks(sweep))
         known = torque[:, j][np.all(np.isfinite(torque[:, j]), axis=-1)]
         if len(known):
             low, high = known.min(axis=0), known.max(axis=0)
             rows = np.arange(len(joints)) + (j - (len(names) - 1) / 2) * height
-            # a torque that stands still is still seen
+            # a dot, for a torque that is constant
             right.hlines(rows, low, high, color=colour[name], linewidth=160 * height / len(joints))
             right.plot((low + high) / 2, rows, ".", color=colour[name], markersize=3)
-    mark_failed(left, dataset, colour)
+    mark_failed(left, sweep, colour)
     right.axvline(0.0, color=MUTED, linewidth=0.8)
     right.set_yticks(np.arange(len(joints)), joints, fontsize=8)
     right.invert_yaxis()
@@ -120,13 +120,13 @@ def plot_torques(dataset: Sweep) -> Figure:
 
 def _draw_per_contact(
     ax: Axes,
-    dataset: Sweep,
+    sweep: Sweep,
     values: Float[np.ndarray, "N criterion contact"],
     *,
     legend: bool,
 ) -> None:
     """One line per criterion (colour) and contact (style)."""
-    x, names, contacts = abscissa(dataset), labels(dataset, "criterion"), labels(dataset, "contact")
+    x, names, contacts = abscissa(sweep), labels(sweep, "criterion"), labels(sweep, "contact")
     colour, style = colours(names), line_styles(contacts)
     for j, name in enumerate(names):
         for k, contact in enumerate(contacts):
@@ -135,9 +135,9 @@ def _draw_per_contact(
                 values[:, j, k],
                 color=colour[name],
                 linestyle=style[contact],
-                **marks(dataset),
+                **marks(sweep),
             )
-    mark_failed(ax, dataset, colour)
+    mark_failed(ax, sweep, colour)
     ax.set_xlabel(x.label)
     if legend:
         add_legend(ax, colour, style)
@@ -146,7 +146,7 @@ def _draw_per_contact(
 def _keep_readable(
     ax: Axes, colour: dict[str, str], travel: Float[np.ndarray, "N criterion"]
 ) -> None:
-    """Cut a criterion that lets the CoM go very far, so that the others are seen; and say so."""
+    """Cut off a criterion whose travel is very long, so that the others are visible, and say so."""
     largest = {
         n: np.max(t[np.isfinite(t)], initial=-np.inf) for n, t in zip(colour, travel.T, strict=True)
     }

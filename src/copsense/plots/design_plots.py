@@ -53,7 +53,7 @@ def _draw(ax: Axes, design: Design, value: Callable[[Score], float], sign: float
         ax.plot(*at, "D", color=shade, markersize=8, label=score.criterion, zorder=4)
     at = (design.score.torque_norm, value(design.score))
     ax.plot(*at, "*", color=INK, markersize=15, label=f"designed ({design.objective})", zorder=5)
-    # A candidate that squanders torque would press the others against the axis.
+    # A candidate with very large torques would squeeze the others against the axis.
     low, high = points[:, 0].min(), np.median(points[:, 0])
     shown = [s.torque_norm for s in (*design.baselines, *front, design.score)]
     high = max(2 * high - low, *shown)

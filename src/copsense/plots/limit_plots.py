@@ -30,32 +30,32 @@ from copsense.plots.style import (
 from copsense.regions import ComRegion
 from copsense.sweeps import Sweep
 
-_AT_LIMIT = 1e-9  # m, N or N m: so near to its bound a limit is active
+_AT_LIMIT = 1e-9  # m, N or N m: a limit this near to its bound is active
 _KIND_TITLES = {"cop": "CoP to the edge", "torque": "joint torque"}
-_DEGENERATE = 3  # vertices from which a region has an area
+_DEGENERATE = 3  # vertices: a region with fewer has no area
 
 
 @styled
-def plot_limited(dataset: Sweep, binding: Mapping[str, Sequence[float]]) -> Figure:
+def plot_limited(sweep: Sweep, binding: Mapping[str, Sequence[float]]) -> Figure:
     """Draw a sweep within limits: each CoP, and its slope with the jumps where a limit binds.
 
     Args:
-        dataset: a lateral sweep evaluated with limits.
+        sweep: a lateral sweep evaluated with limits.
         binding: criterion -> CoM y at which its first limit binds, to either side [m].
     """
     figure = new_figure(9.2, 3.9)
     left, right = figure.subplots(1, 2)
-    plot_cop(dataset, ax=left, legend=False)
-    x, names = abscissa(dataset), labels(dataset, "criterion")
-    contacts, colour = labels(dataset, "contact"), colours(names)
+    plot_cop(sweep, ax=left, legend=False)
+    x, names = abscissa(sweep), labels(sweep, "criterion")
+    contacts, colour = labels(sweep, "contact"), colours(names)
     styles = line_styles(contacts)
-    slope = dataset["cop_slope"].sel(axis="y").values
+    slope = sweep["cop_slope"].sel(axis="y").values
     for j, name in enumerate(names):
         ends = sorted(value * MM for value in binding.get(name, ()))
         for at in ends:
             right.axvline(at, color=colour[name], **LIMIT_LINE)
         for k, contact in enumerate(contacts):
-            # A line a piece: what jumps is not joined.
+            # One line for each piece: jumps are not joined.
             for piece in _pieces(x.values, ends):
                 right.plot(
                     x.values[piece],
@@ -72,7 +72,7 @@ def plot_limited(dataset: Sweep, binding: Mapping[str, Sequence[float]]) -> Figu
 @styled
 def plot_regions(
     regions: Mapping[str, ComRegion],
-    dataset: Sweep,
+    sweep: Sweep,
     *,
     com: ArrayLike | None = None,
     ax: Axes | None = None,
@@ -80,14 +80,14 @@ def plot_regions(
     """Draw nested regions of the CoM from above, the widest first, with the soles and its path.
 
     Args:
-        regions: what each is called -> the region; a criterion's own has that criterion's colour.
-        dataset: a sweep, for the soles and the path of the CoM.
+        regions: name -> region; one with a criterion's name has that criterion's colour.
+        sweep: gives the soles and the path of the CoM.
         com: (2,) world x, y of the CoM at the posture that the regions hold [m].
         ax: where to draw; default a new figure.
     """
     ax = axes_or_new(ax, 6.2, 4.6)
-    colour = colours([name for name in regions if name in labels(dataset, "criterion")])
-    draw_ground(ax, world_soles(dataset), contact_origins(dataset))
+    colour = colours([name for name in regions if name in labels(sweep, "criterion")])
+    draw_ground(ax, world_soles(sweep), contact_origins(sweep))
     grey = iter(("#9aa4ae", INK, MUTED))
     shown: dict[str, str] = {}
     corners = [np.zeros((0, 2))]
@@ -110,43 +110,43 @@ def plot_regions(
             # Segments lie on one another: the later ones are thinner, so that none hides.
             width = max(9.0 - 2.5 * number, 1.8)
             ax.plot(outline[:, 1], outline[:, 0], color=shade, linewidth=width, zorder=3)
-    way = dataset["com"].values[:, :2] * MM
+    way = sweep["com"].values[:, :2] * MM
     ax.plot(way[:, 1], way[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
     if com is not None:
         x, y = np.asarray(com, dtype=float) * MM
         ax.plot(y, x, "+", color=INK, markersize=13, markeredgewidth=2, zorder=5)
-    frame_ground(ax, world_soles(dataset), contact_origins(dataset), np.vstack(corners))
+    frame_ground(ax, world_soles(sweep), contact_origins(sweep), np.vstack(corners))
     add_legend(ax, shown)
     return ax
 
 
 @styled
 def plot_limit_margins(
-    dataset: Sweep, *, axes: Sequence[Axes] | None = None, legend: bool = True
+    sweep: Sweep, *, axes: Sequence[Axes] | None = None, legend: bool = True
 ) -> Figure:
     """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
 
     Args:
-        dataset: a sweep with margins, from `Sweep.with_limit_margins`.
+        sweep: a sweep within limits, or from `Sweep.with_limit_margins`.
         axes: where to draw, one for each of `limit_kinds`; default a new figure.
-        legend: whether to say which colour is which criterion.
+        legend: whether to add a legend of the criteria.
     """
-    kinds = limit_kinds(dataset)
+    kinds = limit_kinds(sweep)
     if axes is None:
         axes = new_figure(max(2.9 * len(kinds), 4.2), 3.0).subplots(1, len(kinds), squeeze=False)[0]
-    x, names = abscissa(dataset), labels(dataset, "criterion")
+    x, names = abscissa(sweep), labels(sweep, "criterion")
     colour = colours(names)
     for ax, kind in zip(axes, kinds, strict=True):
-        of_kind = dataset["limit_kind"].values == kind
-        unit = str(dataset["limit_unit"].values[of_kind][0])
+        of_kind = sweep["limit_kind"].values == kind
+        unit = str(sweep["limit_unit"].values[of_kind][0])
         scale, unit = (MM, "mm") if unit == "m" else (1.0, unit)
-        margin = dataset["limit_margin"].values[..., of_kind] * scale
+        margin = sweep["limit_margin"].values[..., of_kind] * scale
         least = np.where(np.isnan(margin), np.inf, margin).min(axis=-1)
         least = np.where(np.isfinite(least), least, np.nan)
         for j, name in enumerate(names):
-            ax.plot(x.values, least[:, j], color=colour[name], **marks(dataset))
+            ax.plot(x.values, least[:, j], color=colour[name], **marks(sweep))
         shade_below_zero(ax, least, "beyond")
-        mark_first_limits(ax, dataset)
+        mark_first_limits(ax, sweep)
         ax.set_title(_KIND_TITLES.get(kind, kind))
         ax.set_xlabel(x.label)
         ax.set_ylabel(f"smallest margin [{unit}]")
@@ -155,17 +155,17 @@ def plot_limit_margins(
     return axes[0].figure  # type: ignore[return-value]
 
 
-def limit_kinds(dataset: Sweep) -> list[str]:
+def limit_kinds(sweep: Sweep) -> list[str]:
     """The kinds of limit whose margins a sweep holds, in their order."""
-    return list(dict.fromkeys(str(kind) for kind in dataset["limit_kind"].values))
+    return list(dict.fromkeys(str(kind) for kind in sweep["limit_kind"].values))
 
 
-def mark_first_limits(ax: Axes, dataset: Sweep) -> None:
+def mark_first_limits(ax: Axes, sweep: Sweep) -> None:
     """A dotted line where each criterion meets its first limit, to either side of free postures."""
-    x, names = abscissa(dataset).values, labels(dataset, "criterion")
+    x, names = abscissa(sweep).values, labels(sweep, "criterion")
     colour = colours(names)
     for j, name in enumerate(names):
-        for at in first_limits(dataset, j):
+        for at in first_limits(sweep, j):
             ax.axvline(
                 float(np.interp(at, np.arange(len(x)), x)),
                 color=colour[name],
@@ -174,15 +174,15 @@ def mark_first_limits(ax: Axes, dataset: Sweep) -> None:
             )
 
 
-def first_limits(dataset: Sweep, criterion: int) -> list[float]:
+def first_limits(sweep: Sweep, criterion: int) -> list[float]:
     """Where free postures end, as indices between postures.
 
     Interpolated between the last free posture and the first beyond; where the wrenches were held
     at the limit, extrapolated from the last two free ones.
     """
-    margins = dataset["limit_margin"].values[:, criterion]
+    margins = sweep["limit_margin"].values[:, criterion]
     known = np.where(np.isnan(margins), np.inf, margins)
-    failed = dataset["reason"].values[:, criterion] != ""
+    failed = sweep["reason"].values[:, criterion] != ""
     free = (known.min(axis=-1, initial=np.inf) > _AT_LIMIT) & ~failed
     ends: list[float] = []
     for i in np.flatnonzero(free[1:] != free[:-1]):
@@ -199,6 +199,6 @@ def first_limits(dataset: Sweep, criterion: int) -> list[float]:
 
 
 def _pieces(x: Float[np.ndarray, " N"], ends: Sequence[float]) -> list[np.ndarray]:
-    """Indices of the stretches between the jumps."""
+    """Indices of the pieces between the jumps."""
     bounds = [-np.inf, *ends, np.inf]
     return [np.flatnonzero((x > low) & (x <= high)) for low, high in pairwise(bounds)]

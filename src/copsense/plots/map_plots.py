@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
-from copsense.maps.marginal import Marginal
+from copsense.maps.marginals import Marginal
 from copsense.plots.reading import MM
 from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
 
@@ -45,7 +45,7 @@ def plot_map(
             `copsense.maps.skeleton` gives them; three are drawn.
 
     Raises:
-        InvalidInputError: no marginal, or of different criteria.
+        InvalidInputError: there is no marginal, or they have different criteria.
     """
     if not marginals or len({m.criteria for m in marginals}) != 1:
         raise InvalidInputError(
@@ -102,7 +102,7 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
     known = cells[np.isfinite(cells)]
     if not len(known) and not ax.texts:
         _say(ax, _NONE)
-    # The same levels in a row: what is flat beside the other has no line.
+    # The same levels across a row, so that a flat map shows no lines.
     levels = MaxNLocator(_LEVELS).tick_values(colour["vmin"], colour["vmax"])
     crossed = [
         level for level in levels if known.min(initial=np.inf) < level < known.max(initial=-np.inf)
@@ -124,17 +124,17 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
 
 
 def _level(value: float) -> str:
-    """A contour's label: all its digits, for half a step is none that may be rounded away."""
+    """A contour's label with all its digits: half a step must not be rounded away."""
     return f"{value + 0.0:.6g}"
 
 
 def _say(ax: Axes, words: str) -> None:
-    """Words in the middle of what has nothing to show."""
+    """Write in the middle of axes that have nothing to show."""
     ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=MUTED)
 
 
 def _draw_postures(ax: Axes, name: str, skeletons: Sequence[np.ndarray]) -> None:
-    """Skeletons in the frontal plane, as one who stands before the robot sees them."""
+    """Skeletons in the frontal plane, seen by someone in front of the robot."""
     for lines, shade in zip(skeletons[: len(_SHADES)], _SHADES, strict=False):
         for segment in lines:
             ax.plot(segment[:, 1], segment[:, 2], color=INK, alpha=shade, linewidth=1.6)

@@ -12,16 +12,14 @@ from copsense.plots.reading import abscissa
 from copsense.plots.style import BAD, MUTED
 from copsense.sweeps import Sweep
 
-_FEW = 12  # postures: as few as this are shown as points on the line
-_NOTHING = 1e-9  # of the largest value: less below zero is rounding
-_ROOM = 0.1  # of the axes, that a line of text needs
+_FEW = 12  # postures: lines with this many or fewer have markers
+_NOTHING = 1e-9  # share of the largest value: less below zero is rounding
+_ROOM = 0.1  # share of the axes' height that a line of text needs
 
 
-def mark_failed(
-    ax: Axes, dataset: Sweep, colour: dict[str, str], against: str | None = None
-) -> None:
-    """A cross on the lower edge where a row has failed: a gap alone is easily missed."""
-    x, rows = abscissa(dataset, against).values, dataset.failed.values
+def mark_failed(ax: Axes, sweep: Sweep, colour: dict[str, str], against: str | None = None) -> None:
+    """Put a cross on the lower edge where a row failed: a gap alone is easily missed."""
+    x, rows = abscissa(sweep, against).values, sweep.failed.values
     if not rows.any():
         return
     for j, shade in enumerate(colour.values()):
@@ -48,13 +46,13 @@ def mark_failed(
     )
 
 
-def marks(dataset: Sweep) -> dict[str, Any]:
-    """Style of a line: points on it where there are few postures."""
-    return {"marker": "o", "markersize": 3.5} if dataset.sizes["posture"] <= _FEW else {}
+def marks(sweep: Sweep) -> dict[str, Any]:
+    """The style of a line: with markers where there are few postures."""
+    return {"marker": "o", "markersize": 3.5} if sweep.sizes["posture"] <= _FEW else {}
 
 
 def shade_below_zero(ax: Axes, values: Float[np.ndarray, "N ..."], words: str) -> None:
-    """Shade what is below zero, if anything is; and say what it means, if there is room."""
+    """Shade what is below zero, if anything is, and label it where there is room."""
     ax.axhline(0.0, color=MUTED, linewidth=1.0)
     known = values[np.isfinite(values)]
     if not np.any(known < -_NOTHING * np.abs(known).max(initial=0.0)):

@@ -1,4 +1,4 @@
-"""Reading a sweep for drawing: units that read well, contact axes laid out in the world."""
+"""Results as they are drawn: mm and degrees, contact axes turned into the world."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ class Abscissa:
     label: str
 
 
-def abscissa(dataset: LabelledResult, name: str | None = None) -> Abscissa:
+def abscissa(result: LabelledResult, name: str | None = None) -> Abscissa:
     """The path's coordinate, or another coordinate over postures, in mm or degrees."""
-    name = name or str(dataset.attrs["coordinate"])
-    variable = dataset[name]
+    name = name or str(result.attrs["coordinate"])
+    variable = result[name]
     values = np.asarray(variable.values, dtype=float)
     title = {"com_y": "CoM y", "com_x": "CoM x", "index": "posture"}.get(name, name)
     unit = str(variable.attrs.get("units", "1"))
@@ -41,49 +41,49 @@ def abscissa(dataset: LabelledResult, name: str | None = None) -> Abscissa:
     return Abscissa(values, title if unit == "1" else f"{title} [{unit}]")
 
 
-def labels(dataset: LabelledResult, dimension: str) -> list[str]:
+def labels(result: LabelledResult, dimension: str) -> list[str]:
     """The names along a dimension."""
-    return [str(name) for name in np.atleast_1d(dataset[dimension].values)]
+    return [str(name) for name in np.atleast_1d(result[dimension].values)]
 
 
-def world_cops(dataset: LabelledResult) -> Float[np.ndarray, "N criterion contact 2"]:
+def world_cops(result: LabelledResult) -> Float[np.ndarray, "N criterion contact 2"]:
     """Horizontal position of each CoP in the world [mm]."""
-    axes = dataset["contact_rotation"].values[:, :2, :2]
-    cops = np.einsum("kab,ijkb->ijka", axes, dataset["cop"].values)
-    return np.asarray((contact_origins(dataset) / MM + cops) * MM)
+    axes = result["contact_rotation"].values[:, :2, :2]
+    cops = np.einsum("kab,ijkb->ijka", axes, result["cop"].values)
+    return np.asarray((contact_origins(result) / MM + cops) * MM)
 
 
-def contact_origins(dataset: LabelledResult) -> Float[np.ndarray, "contact 2"]:
+def contact_origins(result: LabelledResult) -> Float[np.ndarray, "contact 2"]:
     """Horizontal position of each contact frame in the world [mm]."""
-    return np.asarray(dataset["contact_position"].values[:, :2] * MM)
+    return np.asarray(result["contact_position"].values[:, :2] * MM)
 
 
-def world_soles(dataset: LabelledResult) -> list[Float[np.ndarray, "k 2"] | None]:
+def world_soles(result: LabelledResult) -> list[Float[np.ndarray, "k 2"] | None]:
     """Outline of each sole in the world, seen from above [mm]; None for a contact without one."""
-    if "sole_polygon" not in dataset:
-        return [None] * dataset.sizes["contact"]
-    axes = dataset["contact_rotation"].values[:, :2, :2]
+    if "sole_polygon" not in result:
+        return [None] * result.sizes["contact"]
+    axes = result["contact_rotation"].values[:, :2, :2]
     soles: list[np.ndarray | None] = []
-    for k, sole in enumerate(map(unpadded, dataset["sole_polygon"].values)):
-        outline = contact_origins(dataset)[k] + sole.vertices @ axes[k].T * MM if sole else None
+    for k, sole in enumerate(map(unpadded, result["sole_polygon"].values)):
+        outline = contact_origins(result)[k] + sole.vertices @ axes[k].T * MM if sole else None
         soles.append(outline)
     return soles
 
 
-def edges(dataset: LabelledResult, axis: str) -> list[tuple[float, float] | None]:
+def edges(result: LabelledResult, axis: str) -> list[tuple[float, float] | None]:
     """The two edges of each sole along an axis [mm], level with the middle of its CoPs."""
-    cops = world_cops(dataset)[..., 1 - _AXES[axis]]
+    cops = world_cops(result)[..., 1 - _AXES[axis]]
     found = []
-    for k, sole in enumerate(world_soles(dataset)):
+    for k, sole in enumerate(world_soles(result)):
         here = cops[:, :, k]
         known = here[np.isfinite(here)]
-        at = float(np.median(known)) if known.size else float(contact_origins(dataset)[k, 0])
+        at = float(np.median(known)) if known.size else float(contact_origins(result)[k, 0])
         found.append(None if sole is None else Polygon.hull(sole).section(axis, at))
     return found
 
 
-def first_to_go(dataset: LabelledResult) -> Float[np.ndarray, "N criterion"]:
+def first_to_go(result: LabelledResult) -> Float[np.ndarray, "N criterion"]:
     """First-order CoM travel to the first contact that tips or unloads [mm]; NaN if none does."""
-    both = np.minimum(dataset["com_travel"].values, dataset["unloading_travel"].values)
+    both = np.minimum(result["com_travel"].values, result["unloading_travel"].values)
     least = both.min(axis=2) * MM  # a failed row is NaN on every contact
     return np.asarray(np.where(np.isfinite(least), least, np.nan))

@@ -29,7 +29,7 @@ from copsense.simulation import Event, Recording
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 _RED = "#b3261e"
-_STILL = 0.1  # mm: less than this is drawn as standing still
+_STILL = 0.1  # mm: smaller motions are drawn as standing still
 _MOST_NAMED = 6  # joints whose torque has a line of its own in the legend
 
 
@@ -38,9 +38,9 @@ def plot_rollout(recording: Recording, *, against: str | None = None) -> Figure:
     """Draw a recording: forces, CoPs in the soles, CoM, torques, and CoP against a joint.
 
     Args:
-        recording: what `copsense.simulation.rollout` returns, with or without a static prediction.
-        against: joint whose position the last panel has along its axis; default the first hip
-            roll there is, or else the CoM.
+        recording: with or without a static prediction attached.
+        against: joint along the horizontal axis of the last panel; default the first hip roll,
+            or the CoM without one.
     """
     figure = new_figure(12.6, 7.4)
     panels = figure.subplots(2, 3)
@@ -159,7 +159,7 @@ def _draw_com(ax: Axes, recording: Recording) -> None:
     ax.plot(time, com, color="#1d2733")
     ax.set_ylabel("CoM y [mm]")
     span = np.concatenate([target.values, com.values])
-    if np.ptp(span) < _STILL:  # rounding is no motion
+    if np.ptp(span) < _STILL:  # rounding is not a motion
         ax.set_ylim(span.mean() - _STILL, span.mean() + _STILL)
     wide = Line2D([], [], label="asked for", **{**_STATIC, "linewidth": 4.0})
     put_legend(ax, [wide, Line2D([], [], color="#1d2733", label="measured")])

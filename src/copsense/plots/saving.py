@@ -1,4 +1,4 @@
-"""save_figure: a figure as a file, whole or not there."""
+"""save_figure: a figure as a file, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from copsense.files import check_output, write_beside
 
 SUFFIXES = (".png", ".svg", ".pdf")
-# No date in the file: the same figure is the same file.
+# No date in the file: the same figure gives the same bytes.
 _UNDATED: dict[str, dict[str, None]] = {
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
@@ -20,12 +21,12 @@ _UNDATED: dict[str, dict[str, None]] = {
 
 
 def save_figure(
-    figure: Figure, path: str | Path, *, overwrite: bool = False, dpi: float = 160.0
+    figure: Figure | Axes, path: str | Path, *, overwrite: bool = False, dpi: float = 160.0
 ) -> Path:
     """Write a figure as PNG, SVG or PDF, by its suffix.
 
     Args:
-        figure: what a plot function returned, or the ``figure`` of its axes.
+        figure: what a plot function returned; of axes, the whole figure they are in.
         path: where; its folder must exist.
         overwrite: whether an existing file may be replaced.
         dpi: dots per inch of a PNG.
@@ -40,9 +41,11 @@ def save_figure(
     return path
 
 
-def render_figure(figure: Figure, suffix: str, *, dpi: float = 160.0) -> bytes:
+def render_figure(figure: Figure | Axes, suffix: str, *, dpi: float = 160.0) -> bytes:
     """A figure as the content of a file with that suffix; the same figure gives the same bytes."""
     content = BytesIO()
+    whole = figure.get_figure(root=True)
+    assert whole is not None
     with mpl.rc_context({"svg.hashsalt": "copsense", "svg.fonttype": "path"}):
-        figure.savefig(content, format=suffix[1:], dpi=dpi, metadata=_UNDATED[suffix])
+        whole.savefig(content, format=suffix[1:], dpi=dpi, metadata=_UNDATED[suffix])
     return content.getvalue()

@@ -32,20 +32,20 @@ _ROOM = 0.12  # of the feet's extent, around them
 
 
 @styled
-def plot_soles(dataset: Sweep) -> Figure:
+def plot_soles(sweep: Sweep) -> Figure:
     """Draw from above where the CoPs go: a panel per criterion, coloured along the path."""
-    names = labels(dataset, "criterion")
+    names = labels(sweep, "criterion")
     figure = new_figure(4.1 * len(names) + 1.0, 4.6)
     panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    x, colour, ramp = abscissa(dataset), colours(names), _ramp()
+    x, colour, ramp = abscissa(sweep), colours(names), _ramp()
     shade = Normalize(float(x.values.min()), float(x.values.max()))
-    cops, com = world_cops(dataset), dataset["com"].values[:, :2] * MM
+    cops, com = world_cops(sweep), sweep["com"].values[:, :2] * MM
     for j, (ax, name) in enumerate(zip(panels, names, strict=True)):
-        draw_ground(ax, world_soles(dataset), contact_origins(dataset))
-        for k in range(dataset.sizes["contact"]):
+        draw_ground(ax, world_soles(sweep), contact_origins(sweep))
+        for k in range(sweep.sizes["contact"]):
             _draw_ramp(ax, cops[:, j, k], x.values, ramp, shade)
         ax.plot(com[:, 1], com[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
-        frame_ground(ax, world_soles(dataset), contact_origins(dataset), cops)
+        frame_ground(ax, world_soles(sweep), contact_origins(sweep), cops)
         ax.set_title(name, color=colour[name])
     for ax in panels[1:]:
         ax.set_ylabel("")
@@ -68,7 +68,7 @@ def draw_ground(
                 Polygon(sole[:, ::-1], facecolor=SOLE, edgecolor=MUTED, linewidth=1.1, zorder=1)
             )
     if all(sole is None for sole in soles) and len(origins) > 2:
-        # point feet: what holds the robot is the polygon between them
+        # point feet: the support polygon between them
         middle = origins.mean(axis=0)
         around = np.argsort(np.arctan2(*(origins - middle).T))
         ax.add_patch(
@@ -122,7 +122,7 @@ def draw_track(
 
 
 def stands_still(track: Float[np.ndarray, "N 2"]) -> bool:
-    """Whether a CoP does not move, as a point contact's does not, or has no two known places."""
+    """Whether a CoP does not move, as on a point contact, or is known at fewer than two places."""
     known = track[np.all(np.isfinite(track), axis=1)]
     return len(known) < 2 or float(np.ptp(known, axis=0).max()) < 1e-6
 
@@ -148,5 +148,5 @@ def _draw_ramp(
 
 
 def _ramp() -> ListedColormap:
-    """Viridis without its palest end, which is lost on white."""
+    """Viridis without its palest end, which is hard to see on white."""
     return ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)))

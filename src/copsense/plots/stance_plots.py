@@ -36,7 +36,7 @@ def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figu
         sensitivities: of that stance, one per criterion, at least one.
 
     Raises:
-        InvalidInputError: no sensitivity, or one of another number of contacts.
+        InvalidInputError: there is no sensitivity, or one has another number of contacts.
     """
     if not sensitivities or any(len(s.cop) != len(stance.contacts) for s in sensitivities):
         raise InvalidInputError(
@@ -88,7 +88,7 @@ class _Drawn:
         )  # (nc, 2, 2): columns for the CoM forward and to the left
 
     def points(self) -> np.ndarray:
-        """Where something is drawn."""
+        """The places where something is drawn (k, 2) [mm]."""
         return np.vstack([self.cops, *(self.cops + self.moves[:, :, j] for j in (0, 1))])
 
 
@@ -96,7 +96,7 @@ def _draw_arrows(ax: Axes, drawn: _Drawn) -> None:
     for cop, moves in zip(drawn.cops, drawn.moves, strict=True):
         for j, colour in enumerate((_FORWARD, _LEFT)):
             tip = cop + moves[:, j]
-            if np.linalg.norm(moves[:, j]) > 0.5:  # mm: shorter is a dot with a head
+            if np.linalg.norm(moves[:, j]) > 0.5:  # mm: shorter is all head
                 ax.annotate(
                     "",
                     (tip[1], tip[0]),
@@ -146,7 +146,7 @@ def _write_loads(
             color=INK,
             linespacing=1.25,
         )
-    # room for the words
+    # room for the text
     low, high = ax.get_ylim()
     behind = any(origin[0] < front - 1.0 for origin in origins)
     ax.set_ylim(low - 0.22 * behind * (high - low), high + 0.22 * (high - low))

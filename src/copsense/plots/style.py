@@ -1,6 +1,6 @@
 """Style: colours, lines and legends that mean the same in every figure.
 
-Colour is the criterion (Okabe and Ito's palette, told apart by the colour-blind), line style the
+Colour is the criterion (Okabe and Ito's palette, safe for colour-blind readers), line style the
 contact.
 """
 
@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure as Figure  # for those who may not import matplotlib
+from matplotlib.figure import Figure as Figure  # for modules that do not import matplotlib
 from matplotlib.lines import Line2D
 
 P = ParamSpec("P")
@@ -32,7 +32,7 @@ _KNOWN = {
 _OTHERS = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#8C6D31", "#000000")
 _STYLES: tuple[Any, ...] = ("-", (0, (4.5, 1.8)), (0, (1.2, 1.4)), (0, (5, 1.4, 1.2, 1.4)))
 
-_LETTERS, _HANDLE = 17.0, 6  # per inch of a legend's row; that a handle takes
+_LETTERS, _HANDLE = 17.0, 6  # letters per inch of a legend; letters that a handle takes
 
 _RC = {
     "font.family": "DejaVu Sans",
@@ -67,7 +67,7 @@ _RC = {
     "lines.solid_capstyle": "round",
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
-    "svg.hashsalt": "copsense",  # the same picture is the same file
+    "svg.hashsalt": "copsense",  # the same figure gives the same bytes
     "svg.fonttype": "path",
 }
 
@@ -84,7 +84,7 @@ def styled(plot: Callable[P, R]) -> Callable[P, R]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure [inches] that no window and no global state knows of."""
+    """A figure [inches] without a window, unknown to pyplot."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -118,7 +118,7 @@ def add_legend(
     contacts: dict[str, Any] | None = None,
     extra: Iterable[Line2D] = (),
 ) -> None:
-    """A legend over the axes that says colour and line style once each."""
+    """A legend over the axes with each colour and line style once."""
     handles = [Line2D([], [], color=c, label=n) for n, c in criteria.items()]
     handles += [
         Line2D([], [], color=MUTED, linestyle=style, label=name)

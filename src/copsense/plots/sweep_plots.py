@@ -42,44 +42,44 @@ _LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the
 
 
 @styled
-def plot_results(dataset: Sweep) -> Figure:
+def plot_results(sweep: Sweep) -> Figure:
     """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel.
 
-    If it has margins to limits, from `Sweep.with_limit_margins`, these are drawn below, and a
-    dotted line in each panel where a criterion meets its first limit.
+    Margins to limits, of a sweep within limits or from `Sweep.with_limit_margins`, are drawn below,
+    with a dotted line in each panel where a criterion meets its first limit.
     """
-    kinds = limit_kinds(dataset) if "limit_margin" in dataset else []
+    kinds = limit_kinds(sweep) if "limit_margin" in sweep else []
     figure = new_figure(9.0, 10.0 if kinds else 7.2)
     n = max(len(kinds), 1)
     grid = figure.add_gridspec(3 if kinds else 2, 2 * n)
     above, cop, load, travel = (
         figure.add_subplot(grid[i, j * n : (j + 1) * n]) for i in (0, 1) for j in (0, 1)
     )
-    _draw_above(above, dataset)
-    plot_cop(dataset, axis=widest_axis(dataset), ax=cop, legend=False)
-    plot_load(dataset, ax=load, legend=False)
-    plot_travel(dataset, ax=travel, legend=False)
+    _draw_above(above, sweep)
+    plot_cop(sweep, axis=widest_axis(sweep), ax=cop, legend=False)
+    plot_load(sweep, ax=load, legend=False)
+    plot_travel(sweep, ax=travel, legend=False)
     if kinds:
         below = [figure.add_subplot(grid[2, 2 * i : 2 * i + 2]) for i in range(n)]
-        plot_limit_margins(dataset, axes=below, legend=False)
+        plot_limit_margins(sweep, axes=below, legend=False)
         for ax in below[1:]:
             ax.set_ylabel(ax.get_ylabel().replace("smallest margin ", ""))
         for ax in (cop, load, travel):
-            mark_first_limits(ax, dataset)
+            mark_first_limits(ax, sweep)
     above.set_title("where the CoPs go, from above")
     cop.set_title("CoPs between the soles' edges")
     load.set_title("who carries the weight")
     travel.set_title("how far the CoM may still go")
-    coordinate = abscissa(dataset).label.partition(" [")[0]
-    count = dataset.sizes["posture"]
+    coordinate = abscissa(sweep).label.partition(" [")[0]
+    count = sweep.sizes["posture"]
     figure.suptitle(
-        f"{dataset.attrs['robot']}: {count} posture{'s' * (count != 1)} along {coordinate}",
+        f"{sweep.attrs['robot']}: {count} posture{'s' * (count != 1)} along {coordinate}",
         x=0.01,
         ha="left",
         fontsize=12.5,
         fontweight="bold",
     )
-    handles = _handles(dataset)
+    handles = _handles(sweep)
     needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
     columns = math.ceil(len(handles) / math.ceil(needed / _LINE))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=9)
@@ -87,9 +87,9 @@ def plot_results(dataset: Sweep) -> Figure:
     return figure
 
 
-def widest_axis(dataset: Sweep) -> str:
+def widest_axis(sweep: Sweep) -> str:
     """The world axis along which the CoM moves most."""
-    com = dataset["com"].values[:, :2]
+    com = sweep["com"].values[:, :2]
     known = com[np.all(np.isfinite(com), axis=1)]
     if not len(known):
         return "y"
@@ -97,33 +97,33 @@ def widest_axis(dataset: Sweep) -> str:
     return "y" if across >= along else "x"
 
 
-def _draw_above(ax: Axes, dataset: Sweep) -> None:
-    """Every criterion's tracks in one picture, the later ones thinner so that none hides."""
-    names, cops, good = labels(dataset, "criterion"), world_cops(dataset), dataset.planted.values
-    colour, origins = colours(names), contact_origins(dataset)
-    pulling = dataset["pulling"].values.astype(bool)
-    draw_ground(ax, world_soles(dataset), origins)
+def _draw_above(ax: Axes, sweep: Sweep) -> None:
+    """Every criterion's tracks in one picture, the later ones thinner so that all are visible."""
+    names, cops, good = labels(sweep, "criterion"), world_cops(sweep), sweep.planted.values
+    colour, origins = colours(names), contact_origins(sweep)
+    pulling = sweep["pulling"].values.astype(bool)
+    draw_ground(ax, world_soles(sweep), origins)
     for j, name in enumerate(names):
-        for k in range(dataset.sizes["contact"]):
+        for k in range(sweep.sizes["contact"]):
             width = max(5.5 - 2.8 * j, 1.2)
             # a contact that pulls has no centre of pressure
             track = np.where(pulling[:, j, k, None], np.nan, cops[:, j, k])
             draw_track(ax, track, good[:, j, k], colour[name], width)
-    com = dataset["com"].values[:, :2] * MM
+    com = sweep["com"].values[:, :2] * MM
     ax.plot(com[:, 1], com[:, 0], zorder=10, **COM_LINE)
-    frame_ground(ax, world_soles(dataset), origins, np.vstack([com, cops.reshape(-1, 2)]))
+    frame_ground(ax, world_soles(sweep), origins, np.vstack([com, cops.reshape(-1, 2)]))
 
 
-def _handles(dataset: Sweep) -> list[Line2D]:
-    names, contacts = labels(dataset, "criterion"), labels(dataset, "contact")
+def _handles(sweep: Sweep) -> list[Line2D]:
+    names, contacts = labels(sweep, "criterion"), labels(sweep, "contact")
     handles = [Line2D([], [], color=c, label=n) for n, c in colours(names).items()]
     handles += [
         Line2D([], [], color=MUTED, linestyle=style, label=f"load on {name}")
         for name, style in line_styles(contacts).items()
     ]
     handles.append(Line2D([], [], label="CoM", **COM_LINE))
-    if "limit_margin" in dataset and any(first_limits(dataset, j) for j in range(len(names))):
+    if "limit_margin" in sweep and any(first_limits(sweep, j) for j in range(len(names))):
         handles.append(Line2D([], [], label="first limit met", color=MUTED, **LIMIT_LINE))
-    if not np.all(dataset.planted.values | dataset.failed.values[..., None]):
+    if not np.all(sweep.planted.values | sweep.failed.values[..., None]):
         handles.append(Line2D([], [], color=MUTED, label="CoP off its sole", **OFF_SOLE))
     return handles

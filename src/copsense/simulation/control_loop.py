@@ -15,6 +15,7 @@ from copsense.controllers.controller import Controller, Observation, ask, contro
 from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.criterion import Criterion
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
+from copsense.extras import require
 from copsense.limits import Limits
 from copsense.provenance import made_by
 from copsense.simulation.actuation import Actuation
@@ -70,6 +71,7 @@ def rollout(
         CopsenseError: the scenario does not fit the robot or the simulator.
         ControllerError: the controller failed before anything was recorded.
     """
+    require("xarray", "a recording")
     finite_number(record_period, "the time between two rows [s]", positive=True)
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))

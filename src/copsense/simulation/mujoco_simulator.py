@@ -18,9 +18,9 @@ from jaxtyping import Float
 from copsense.errors import (
     EngineMismatchError,
     InvalidInputError,
-    MissingExtraError,
     UnknownNameError,
 )
+from copsense.extras import require
 from copsense.robot import Robot
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.physics_settings import PhysicsSettings
@@ -279,10 +279,9 @@ def load_mujoco() -> Any:
     screen = {"DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL"} & set(os.environ)
     if sys.platform == "linux" and not screen and find_library("EGL"):
         os.environ["MUJOCO_GL"] = "egl"
+    require("mujoco", "simulating a robot")
     try:
         import mujoco
-    except ImportError:
-        raise MissingExtraError("mujoco", "sim", "simulating a robot") from None
     except RuntimeError as error:  # MUJOCO_GL has an invalid value
         raise InvalidInputError(
             f"MuJoCo does not load: {error}. Leave the variable MUJOCO_GL out, or give egl, osmesa "

@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from copsense.errors import InvalidInputError, MissingExtraError, OutputError
+from copsense.errors import InvalidInputError, OutputError
+from copsense.extras import require
 from copsense.files import check_output, write_beside
 from copsense.simulation.mujoco_simulator import load_mujoco
 from copsense.simulation.recording import Recording
@@ -94,10 +95,9 @@ def check_video() -> None:
 
 
 def _encoder() -> Any:
-    try:
-        import imageio_ffmpeg
-    except ImportError:
-        raise MissingExtraError("imageio_ffmpeg", "video", "writing a video") from None
+    require("imageio_ffmpeg", "writing a video")
+    import imageio_ffmpeg
+
     return imageio_ffmpeg.write_frames
 
 

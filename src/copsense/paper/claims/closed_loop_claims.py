@@ -132,7 +132,7 @@ def _quasi_static(sway: Sway) -> Finding:
     "Inequalities on the wrenches limit the value of the CoP: the two concepts are complementary.",
 )
 def _limits(sway: Sway) -> Finding:
-    """Remark 4: what tips without inequalities goes on with them."""
+    """Remark 4: a sway that tips a foot without inequalities is completed with them."""
     least = min(float(np.nanmin(run["margin"].values[1:])) for run in sway.limited.values())
     ends = [run.completed for run in sway.limited.values()]
     return Finding(

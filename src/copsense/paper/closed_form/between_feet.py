@@ -16,7 +16,7 @@ from copsense.paper.closed_form.family import FourBarSolution
 from copsense.paper.closed_form.four_bar_criteria import solve_four_bar
 
 LEFT, RIGHT = 0, 1
-PAPER_LENGTH = 1.0  # m
+PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 NEARLY = 0.05  # "almost", "together with", "is": within a twentieth
 PARTS = np.linspace(-1.0, 1.0, 41)  # of the way from the centre to a foot
 

@@ -62,7 +62,7 @@ class FourBarSolution:
     com: Float[np.ndarray, "2"]
 
     def __post_init__(self) -> None:
-        """Own read-only copies of the arrays, and refuse one that overflowed."""
+        """Own read-only copies of the arrays, and reject one that overflowed."""
         for name in ("wrenches", "torques", "cop", "sensitivity", "cop_per_com", "com"):
             array = np.array(getattr(self, name), dtype=float)
             if not np.all(np.isfinite(array)):
@@ -96,7 +96,7 @@ class FourBarSolution:
 
 
 def leg_angle(xi: object) -> float:
-    """Return `xi` as a float, or raise if it is no angle or the linkage is collapsed there."""
+    """Return `xi` as a float, or raise if it is not an angle or the linkage is collapsed there."""
     angle = finite_number(xi, "xi [rad]")
     if abs(math.sin(angle)) < _COLLAPSED:
         raise InvalidInputError(
@@ -106,7 +106,7 @@ def leg_angle(xi: object) -> float:
     return angle
 
 
-@np.errstate(over="ignore", invalid="ignore")  # FourBarSolution refuses what overflows
+@np.errstate(over="ignore", invalid="ignore")  # FourBarSolution rejects what overflows
 def solve_four_bar_member(
     four_bar: FourBar, xi: float, share: float, horizontal_force: float = 0.0
 ) -> FourBarSolution:

@@ -26,7 +26,7 @@ class Erratum:
         printed_text: what the paper says.
         holding_text: what holds instead.
         note: why, or under which reading the print is right.
-        check: measures it on a four-bar; None where no number on a four-bar could tell.
+        check: measures it on a four-bar; None where no number on a four-bar decides.
         printed_quantities: what the formulas of `printed_text` are, in order.
         holding_quantities: what the formulas of `holding_text` are, in order.
     """

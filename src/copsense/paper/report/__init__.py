@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from copsense.extras import require
+
+require("jinja2", "the report")  # before the modules that import it
+
 from copsense.paper.report.errata_markdown import errata_markdown
 from copsense.paper.report.page import render_page
 from copsense.paper.report.report_figure import ReportFigure

@@ -74,7 +74,7 @@ def sway_in_simulation(
         advance(total - done)
         attached = predict(along, criterion, within).attach(recording)
         if within is None:
-            # The sway may turn before a foot would tip, and looks to one side: the lean goes on.
+            # The sway may turn before a foot would tip, and looks to one side: a lean continues.
             side = farther_side(along.signal)
             lean = predict_lean(stance, criterion, side * _FARTHER * amplitude)
             return attached.with_attributes(

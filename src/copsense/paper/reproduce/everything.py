@@ -67,7 +67,7 @@ def reproduce_paper(
         raise InvalidInputError("the section on limits needs one. Switch one on.")
     clock, stance = Clock(progress), load_stance(ROBOT)
     for criterion in paper_criteria():
-        solve_equilibrium(stance, criterion, limits)  # limits that forbid it are told at once
+        solve_equilibrium(stance, criterion, limits)  # rejects limits that forbid it, at once
     with clock.stage("four-bar"):
         four_bar = FourBar()
         figures = tuple(f(four_bar) for f in (figure_3a, figure_3b, figure_4, figure_5))

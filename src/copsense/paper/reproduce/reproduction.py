@@ -1,4 +1,4 @@
-"""What a reproduction of [Romano2016] comes to."""
+"""Reproduction: the results of reproducing [Romano2016]."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class WithinLimits:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """What the paper comes to.
+    """The results of a reproduction.
 
     Attributes:
         four_bar: the linkage with the paper's dimensions.
@@ -68,7 +68,7 @@ class Reproduction:
         unit_of_length: criterion 1's dependence on L.
         within_limits: the same path within limits, and the regions that they leave the CoM.
         sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
-        benchmark: leans, pushes and a sway under both criteria, as `copsense.comparison` tells
+        benchmark: leans, pushes and a sway under both criteria, as `copsense.comparison` gives
             them; None where the closed loop was left out.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.

@@ -8,7 +8,8 @@ import platform
 import numpy as np
 
 from copsense.paper.closed_form import FourBar
-from copsense.paper.reproduce.sideways import PAPER_LENGTH, feet_distance
+from copsense.paper.closed_form.between_feet import PAPER_LENGTH
+from copsense.paper.reproduce.sideways import feet_distance
 from copsense.posture import PostureCost
 from copsense.provenance import versions
 from copsense.robots import PRESETS

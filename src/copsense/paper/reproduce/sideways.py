@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.paper.claims.icub_sweep import HIP_ROLL, SHORT, TORQUE, WRENCH
+from copsense.paper.closed_form.between_feet import PAPER_LENGTH
 from copsense.paper.reproduce.clock import Clock
 from copsense.paper.reproduce.reproduction import UnitOfLength
 from copsense.path import PosturePath, joint_sweep, lateral_sweep
@@ -14,7 +15,6 @@ from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 from copsense.sweeps import Sweep, sweep
 
-PAPER_LENGTH = 1.0  # m: the L that criterion 1 means and never says
 _LENGTHS = 25  # values of L in the figure on the unit of length
 
 
@@ -37,13 +37,13 @@ def sweep_sideways(
     rolls = [robot.joint_position(s.q, HIP_ROLL) for s in path.stances]
     hip = {"units": "rad", "long_name": "position of the left hip roll joint"}
     rate = {"units": "rad/m", "long_name": "d left hip roll / d com_y along the path"}
-    told = (
+    extended = (
         swept.to_xarray()
         .assign_coords({HIP_ROLL: ("posture", rolls, hip)})
         .assign({f"{HIP_ROLL}_rate": ("posture", path.joint_rates(HIP_ROLL), rate)})
         .assign_attrs(_facts(stance, criteria[0]))
     )
-    return Sweep(told), path
+    return Sweep(extended), path
 
 
 def vary_unit_of_length(stance: Stance) -> UnitOfLength:

@@ -1,0 +1,62 @@
+"""Compiler: how the functions of a kernel become machine code, and how they are called.
+
+Kernels take a hundred arrays. Numba would read the type of each at every call, take it from Python
+with an allocation, and count its owners: longer than the statics of a posture. So nothing here
+owns an array (the caller keeps them alive), and `bound` looks the machine code up once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from numba import njit, typeof
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+# Numba would look at a function's own file alone, and call an older version of a function from
+# another one: machine code is of use while the text of the kernels does not change.
+_STAMP = hashlib.sha256(
+    b"".join(file.read_bytes() for file in sorted(Path(__file__).parent.rglob("*.py")))
+).hexdigest()
+
+
+def compiled(function: _Function) -> _Function:
+    """Part of a kernel: called from compiled code alone."""
+    return _jit(function, no_cpython_wrapper=True)
+
+
+def entry(function: _Function) -> _Function:
+    """A kernel that Python calls; see `bound`."""
+    return _jit(function)
+
+
+def bound(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., None]:
+    """A kernel's machine code for arguments of these types, compiled or read from disk.
+
+    Arguments of other types than these must not be given to it.
+    """
+    found: Callable[..., None] = kernel.compile(tuple(typeof(a) for a in arguments))
+    return found
+
+
+def _jit(function: _Function, **more: Any) -> _Function:
+    """Compile on first use, keep the machine code on disk, and let other threads run meanwhile."""
+    options: dict[str, Any] = {
+        "nogil": True,
+        "fastmath": {"contract"},  # a * b + c in one instruction; nothing is reordered
+        "error_model": "numpy",
+        "no_cfunc_wrapper": True,
+        "_nrt": False,  # no owners are counted, and nothing is allocated
+        **more,
+    }
+    plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
+    try:
+        dispatcher = njit(cache=True, **options)(plain)
+        dispatcher._cache._cache_file._source_stamp = _STAMP
+    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
+        dispatcher = njit(**options)(plain)
+    return dispatcher

@@ -1,0 +1,1 @@
+"""Many postures by named coordinates; see `copsense.batch.PostureChart`."""

@@ -1,0 +1,197 @@
+"""Chart: named coordinates in, postures with the contacts in place out, many at once.
+
+A chart takes the base's pose and the joints off the limbs as they are given, and solves the limbs:
+a leg of six joints under a flat foot is a 6 x 6 system of its own. See `PostureChart`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.arrays import whole_number
+from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.postures.coordinates import (
+    Unit,
+    chart_coordinates,
+    checked_values,
+    joint_units,
+    row_units,
+)
+from copsense.batch.postures.posture_batch import PostureBatch, empty_postures
+from copsense.batch.postures.reference_search import search_one
+from copsense.batch.postures.search_plan import plan_search
+from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK
+from copsense.batch.workspace import workspace, workspace_offsets
+from copsense.errors import InvalidInputError
+from copsense.stance import Stance
+
+_BLOCK = 512  # postures that a thread takes at a time
+
+
+class PostureChart:
+    """Postures of a stance by named coordinates, its contacts in place.
+
+    A coordinate is one of
+
+    - ``com_x``, ``com_y``, ``com_z``: the CoM in the world [m]; the base moves along that axis;
+    - ``base_x``, ``base_y``, ``base_z``: the base's origin in the world [m];
+    - ``roll``, ``pitch``, ``yaw``: its orientation Rz(yaw) Ry(pitch) Rx(roll) [rad];
+    - a joint's name [rad, or m for a prismatic joint];
+    - ``CONTACT:x``, ``CONTACT:y``: world x and y of a contact, which stays on its plane [m];
+      ``CONTACT:yaw``: its x axis' angle in the plane, from the world's x axis laid on it [rad].
+
+    What is not named keeps the stance's value; the joints of the limbs in contact are solved for.
+    Where a limb cannot follow (a joint of a leg is named; a leg has fewer joints than its foot has
+    directions) the base coordinates that are not named are solved for too. Where joints or base
+    leave a choice, every step of the search is the smallest one. Each row starts from the stance's
+    own configuration, so that it depends on its values alone.
+
+    Contacts that a chart moves need nothing more from `evaluate_batch`: where they stand follows
+    from the configuration, and they stay on the planes that the stance states.
+
+    Attributes:
+        stance: where the search starts, and what the coordinates not named are kept from.
+        names: the coordinates.
+        units: ``"m"`` or ``"rad"`` for each.
+        values: of the stance itself (k,).
+        fallback_reason: why postures are solved one at a time; empty where the kernel does it.
+    """
+
+    stance: Stance
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    values: Float[np.ndarray, " k"]
+    fallback_reason: str
+
+    def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
+        """Find out what the names mean.
+
+        Raises:
+            InvalidInputError: no name, one twice, or two that contradict each other.
+            UnknownNameError: a name that is not a coordinate.
+        """
+        self.stance = stance
+        self._coordinates = chart_coordinates(stance, coordinates)
+        self.names, self.units = self._coordinates.names, self._coordinates.units
+        self.values = self._coordinates.given[self._coordinates.place]
+        self.values.flags.writeable = False
+        self._joints, self._rows_named = joint_units(stance), row_units(stance, self._coordinates)
+        self._code: Callable[..., None] | None = None
+        self.fallback_reason = why_not_covered(stance.robot, tuple(stance.contacts))
+        if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
+            self.fallback_reason = "the model's root is not the world"
+        if not self.fallback_reason:
+            layout = robot_layout(stance, [np.zeros((0, 3)) for _ in stance.contacts])
+            offset = workspace_offsets(layout, int(stance.robot.model.nq))
+            search_plan, search = plan_search(stance, layout, offset, self._coordinates)
+            self._given = (*layout.parts, search_plan, offset, search)
+            self._size = search.size
+
+    def empty(self, count: int) -> PostureBatch:
+        """Arrays for `count` postures, to be filled with ``out=``."""
+        return empty_postures(self.stance, whole_number(count, "the number of postures", least=0))
+
+    def solve(
+        self, values: ArrayLike, out: PostureBatch | None = None, threads: int = 1
+    ) -> PostureBatch:
+        """Solve for many postures.
+
+        Args:
+            values: of the coordinates, one posture in each row (N, k) [m, rad].
+            out: a batch of the same size to overwrite.
+            threads: threads that share the postures; the results do not depend on it.
+
+        Returns:
+            Postures that meet every constraint within 1e-12. A row that has none, or that
+            is beyond a joint limit, is NaN and has its reason.
+
+        Raises:
+            InvalidInputError: values of the wrong shape or not finite; `out` of another size.
+        """
+        x = checked_values(values, self.names)
+        threads = whole_number(threads, "threads")
+        batch = self.empty(len(x)) if out is None else self._fitting(out, len(x))
+        batch.reasons[:] = ""
+        status = np.full(len(x), ELSEWHERE, dtype=np.int64)
+        which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
+        if not self.fallback_reason and len(x):
+            self._run(x, batch, status, which, excess, threads)
+        for row in np.flatnonzero(status == ELSEWHERE):
+            found = search_one(self.stance, self._coordinates, x[row])
+            batch.configurations[row], batch.residuals[row] = found.q, found.residual
+            batch.iterations[row], status[row] = found.iterations, found.status
+            which[row], excess[row] = found.which, found.excess
+        np.equal(status, SOLVED, out=batch.converged)
+        failed = np.flatnonzero(~batch.converged)
+        batch.configurations[failed] = np.nan
+        for row in failed:
+            batch.reasons[row] = self._why_not(
+                int(status[row]), int(which[row]), excess[row], batch.residuals[row]
+            )
+        return batch
+
+    def _run(
+        self,
+        x: np.ndarray,
+        batch: PostureBatch,
+        status: np.ndarray,
+        which: np.ndarray,
+        excess: np.ndarray,
+        threads: int,
+    ) -> None:
+        from copsense.batch.compiler import bound
+        from copsense.batch.postures.newton import Found, solve_postures
+
+        found = Found(
+            batch.configurations, batch.residuals, batch.iterations, status, which, excess
+        )
+        arguments = (*self._given, x, found)
+        if self._code is None:
+            self._code = bound(solve_postures, (*arguments, workspace(1), 0, 0))
+        solve, blocks = partial(self._code, *arguments), -(-len(x) // _BLOCK)
+
+        def run(share: int) -> None:
+            W = workspace(self._size)
+            for block in range(share, blocks, threads):
+                solve(W, block * _BLOCK, min((block + 1) * _BLOCK, len(x)))
+
+        if threads == 1:
+            run(0)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(run, range(threads)))
+
+    def _why_not(self, status: int, which: int, excess: float, residual: float) -> str:
+        """Why a row has no posture."""
+        if status == BEYOND:
+            name, unit = self._joints[which]
+            return f"joint {name} over its limit by {excess:.3g} {unit}"
+        how = "unreachable" if status == STUCK else "did not converge"
+        label, unit = self._rows_named[which]
+        return f"{how}: {label} remains {residual:.2e} {unit} off"
+
+    def _fitting(self, out: PostureBatch, count: int) -> PostureBatch:
+        if not isinstance(out, PostureBatch):
+            raise InvalidInputError(
+                f"out is of type {type(out).__name__}. Make it with PostureChart.empty({count})."
+            )
+        wanted = self.empty(0)
+        for field in fields(PostureBatch):
+            array = getattr(out, field.name)
+            like = getattr(wanted, field.name)
+            shape = (count, *like.shape[1:])
+            fits = array.shape == shape and array.dtype == like.dtype
+            if not (fits and array.flags.carray):
+                raise InvalidInputError(
+                    f"out.{field.name} is {array.dtype} of shape {array.shape}, or not contiguous "
+                    f"and writeable; the chart needs {like.dtype} of shape {shape}. Make it with "
+                    f"PostureChart.empty({count})."
+                )
+        return out

@@ -1,0 +1,195 @@
+"""Reference search: the same as `newton`, one posture at a time, with Pinocchio's kinematics.
+
+It serves what the kernel does not: planar robots, joints of several degrees of freedom, any number
+of contacts; and everything where Numba is not installed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from copsense.batch.postures.coordinates import Coordinates, Limb
+from copsense.batch.postures.search_settings import (
+    BEYOND,
+    DAMPING,
+    FLOOR,
+    LONGEST_STEP,
+    MOST_STEPS,
+    OPPOSITE,
+    PATIENCE,
+    PROGRESS,
+    ROUNDING,
+    SOLVED,
+    STUCK,
+    TINY,
+    TOLERANCE,
+    UNSOLVED,
+)
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True, eq=False)
+class Attempt:
+    """Where a search ended.
+
+    Attributes:
+        q: the configuration (nq,).
+        residual: largest error of a constraint [m, rad].
+        iterations: steps taken.
+        status: solved, unsolved, stuck, or beyond a limit.
+        which: the error that remains, or the joint velocity beyond its limit.
+        excess: by how much it is.
+    """
+
+    q: np.ndarray
+    residual: float
+    iterations: int
+    status: int
+    which: int
+    excess: float
+
+
+def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt:
+    """Look for the posture of one row of values (k,)."""
+    model, nb = stance.robot.model, stance.robot.base_nv
+    given = plan.given.copy()
+    given[plan.place] = values
+    for axis in plan.com_axes if nb == 6 else ():  # the base goes where the CoM goes
+        given[axis] += given[model.nv + axis] - plan.given[model.nv + axis]
+    q, placed = stance.q, plan.given[: model.nv]  # where q stands
+    before, steps = np.inf, 0
+    worst, which = np.inf, 0
+    while True:
+        if not np.isfinite(given[: model.nv]).all():  # values so large that their squares overflow
+            return Attempt(q, worst, steps, STUCK, which, 0.0)
+        q = _moved(stance, plan, q, placed, given[: model.nv])
+        placed = given[: model.nv].copy()
+        here = stance.at(q, check=False)
+        h, opposite = _errors(here, plan, given)
+        sizes = np.abs(h)
+        worst = max(float(sizes.max()), float(opposite))
+        which = int(sizes.argmax())
+        hopeless = steps % PATIENCE == 0 and steps > 0 and worst > PROGRESS * before
+        if worst < TOLERANCE:
+            status, joint, excess = _within(here, plan)
+            return Attempt(here.q, worst, steps, status, joint, excess)
+        if steps >= MOST_STEPS or hopeless:
+            status = UNSOLVED if steps >= MOST_STEPS else STUCK
+            return Attempt(here.q, worst, steps, status, which, 0.0)
+        before = worst if steps % PATIENCE == 0 else before
+        with np.errstate(over="ignore", invalid="ignore"):
+            _advance(here, plan, given, h)
+        steps += 1
+
+
+def _advance(here: Stance, plan: Coordinates, given: np.ndarray, h: np.ndarray) -> None:
+    """Take one step of every limb's unknowns."""
+    first = 0
+    for limb in plan.limbs:
+        J = _jacobian(here, plan, given, limb)
+        e = h[first : first + len(J)]
+        first += len(J)
+        # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
+        M = J @ J.T
+        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
+        step = -J.T @ np.linalg.solve(M + mu * np.eye(len(M)), e)
+        longest = float(np.abs(step).max(initial=0.0))
+        given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
+
+
+def _within(here: Stance, plan: Coordinates) -> tuple[int, int, float]:
+    """Solved or beyond a limit; the joint velocity that is worst beyond it, and by how much."""
+    x = np.zeros(len(plan.low))
+    for joint in list(here.robot.model.joints)[2:]:
+        if joint.nq == 1:
+            x[joint.idx_v - here.robot.base_nv] = here.q[joint.idx_q]
+    beyond = np.maximum(plan.low - x, x - plan.high)
+    which = int(beyond.argmax()) if len(beyond) else 0
+    excess = float(beyond.max(initial=0.0))
+    return (BEYOND if excess > ROUNDING else SOLVED), which, excess
+
+
+def _moved(
+    stance: Stance, plan: Coordinates, q: np.ndarray, before: np.ndarray, given: np.ndarray
+) -> np.ndarray:
+    """The configuration of base coordinates and joint positions, the latter from where they are."""
+    model, nb = stance.robot.model, stance.robot.base_nv
+    way = given - before
+    way[:nb] = 0.0
+    q = pin.integrate(model, q, way)
+    if nb == 6:
+        place = pin.SE3(np.eye(3), given[:3].copy())
+        place.rotation = pin.rpy.rpyToMatrix(*given[3:6])
+        local = model.jointPlacements[1].actInv(place)
+        q[:3] = local.translation
+        if plan.turned:
+            turn = pin.SE3ToXYZQUAT(local)[3:]
+            q[3:7] = -turn if turn @ stance.q[3:7] < 0 else turn
+        else:
+            q[3:7] = stance.q[3:7]
+            root = model.jointPlacements[1]
+            q[:3] = root.rotation.T @ (given[:3] - root.translation)
+    else:
+        q[:4] = *given[:2], np.cos(given[2]), np.sin(given[2])
+    return np.asarray(q)
+
+
+def _errors(here: Stance, plan: Coordinates, given: np.ndarray) -> tuple[np.ndarray, bool]:
+    """h, limb by limb, world axes [m, rad]; a planar contact's in its own axes.
+
+    And whether a foot faces away from where it should, where the turn's error says little.
+    """
+    nv, errors, opposite = here.robot.model.nv, [], False
+    for limb in plan.limbs:
+        for k in limb.contacts:
+            contact, place = here.contacts[k], here.placements[k]
+            wanted = given[nv + 3 + 3 * k : nv + 6 + 3 * k]
+            way = wanted - plan.given[nv + 3 + 3 * k : nv + 6 + 3 * k]
+            target = plan.positions[k] + [way[0], way[1], plan.slopes[k] @ way[:2]]
+            off = place.translation - target
+            if contact.kind == "point":
+                errors.append(off)
+                continue
+            s, c = np.sin(way[2]), np.cos(way[2])
+            R = plan.rotations[k] @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+            turn = np.cross(R.T, place.rotation.T).sum(axis=0)
+            open_ = 1.0 + float(np.sum(R * place.rotation))
+            turn = 2.0 / max(open_, OPPOSITE) * turn
+            opposite = opposite or open_ < OPPOSITE
+            if contact.kind == "surface":
+                errors.append(np.concatenate([off, turn]))
+            else:
+                rows = np.concatenate([R.T @ off, R.T @ turn])
+                errors.append(rows[list(contact.components)])
+    errors.append(np.array([here.com[a] - given[nv + a] for a in plan.com_axes]))
+    return np.concatenate(errors), opposite
+
+
+def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) -> np.ndarray:
+    """dh/dx of a limb."""
+    nb, blocks = here.robot.base_nv, []
+    for k in limb.contacts:
+        contact, place = here.contacts[k], here.placements[k]
+        rows = here.jacobian[here.rows[k]]
+        if contact.kind != "planar":  # contact axes to the world's
+            blocks += [place.rotation @ rows[i : i + 3] for i in range(0, len(rows), 3)]
+        else:
+            blocks.append(rows)
+    blocks.append(here.com_jacobian[list(plan.com_axes)])
+    J = np.vstack(blocks)
+    # Columns of the base: along its coordinates instead of its own velocity.
+    B = np.eye(nb)
+    if nb == 6:
+        turn = pin.rpy.rpyToMatrix(*given[3:6])
+        B[:3, :3] = turn.T
+        B[3:, 3:] = turn.T @ pin.rpy.computeRpyJacobian(
+            given[3:6].copy(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        )
+    else:
+        c, s = np.cos(given[2]), np.sin(given[2])
+        B[:2, :2] = [[c, s], [-s, c]]
+    J[:, :nb] = J[:, :nb] @ B
+    return J[:, list(limb.unknowns)]

@@ -1,0 +1,1 @@
+"""Equilibria and sensitivities of many configurations; see `copsense.batch.evaluate_batch`."""

@@ -1,0 +1,261 @@
+"""Batch kernel: many configurations in, wrenches, CoPs and sensitivities out.
+
+The compiled kernel answers what it covers. The reference, one posture at a time, answers everything
+else into the same arrays: criteria and robots that the kernel does not cover, and postures that it
+marks as doubtful, where contacts lose rank, carry no load or are off their planes. Without Numba
+the reference answers all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import TypeGuard
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+
+from copsense.arrays import finite_array, whole_number
+from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.statics.batch_result import GAINS, BatchResult, arrays_of, empty_result
+from copsense.batch.statics.compiled_kernel import CompiledKernel
+from copsense.batch.statics.criteria import kernel_criteria
+from copsense.batch.statics.reference import fill_row, sole_edges
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError
+from copsense.stance import Stance
+from copsense.statics import WrenchPolicy, policy_name
+
+_CHUNK = 512  # postures whose results stay in a core's cache
+_UNIT = 1e-6  # by which a quaternion may miss unit length, as in `Robot.check_configuration`
+
+
+class BatchKernel:
+    """A robot, its contacts and some criteria, made ready for many configurations.
+
+    Attributes:
+        stance: gives robot and contacts; its configuration does not matter.
+        criteria: the criteria or policies, of distinct names.
+        names: of the criteria.
+        gains: whether CoM gain, CoM travel and tipping edge are computed too.
+        fallback_reason: why the reference answers everything; empty where the kernel does its
+            part.
+    """
+
+    stance: Stance
+    criteria: tuple[Criterion | WrenchPolicy, ...]
+    names: tuple[str, ...]
+    gains: bool
+    fallback_reason: str
+
+    def __init__(
+        self, stance: Stance, criteria: Sequence[Criterion | WrenchPolicy], *, gains: bool = True
+    ) -> None:
+        """Check the criteria and lay out the robot.
+
+        Args:
+            stance: gives robot and contacts.
+            criteria: criteria of distinct names, or policies q -> wrenches.
+            gains: compute CoM gain, CoM travel and tipping edge too.
+
+        Raises:
+            InvalidInputError: no criterion, two of one name, or weights that do not fit.
+        """
+        if isinstance(criteria, Criterion):
+            raise InvalidInputError("criteria is a single criterion. Give a list of them.")
+        self.stance, self.criteria, self.gains = stance, tuple(criteria), gains
+        names = [str(c.name) if isinstance(c, Criterion) else policy_name(c) for c in criteria]
+        if not names or len(set(names)) != len(names):
+            raise InvalidInputError(
+                f"a batch needs criteria of distinct names, got {', '.join(names) or 'none'}. "
+                "Give at least one; Criterion.named(...) renames one."
+            )
+        self.names = tuple(names)
+        self._single: _Single | None = None
+        self._nq = int(stance.robot.model.nq)
+        self._expected = arrays_of(self.empty(0))
+        served = kernel_criteria(stance, self.criteria)
+        self.fallback_reason = why_not_covered(stance.robot, tuple(stance.contacts))
+        if not self.fallback_reason and not len(served.column):
+            self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
+        if not self.fallback_reason:
+            layout = robot_layout(stance, sole_edges(stance))
+            self._kernel = CompiledKernel(layout, served, self._nq)
+            if not len(layout.feet.support):
+                self.fallback_reason = "no joint moves between the contacts"
+
+    def empty(self, count: int) -> BatchResult:
+        """Arrays for the results of `count` postures, to be filled with ``out=``."""
+        size = whole_number(count, "the number of postures", least=0)
+        return empty_result(self.stance, self.names, size, gains=self.gains)
+
+    def evaluate(
+        self,
+        configurations: ArrayLike,
+        *,
+        out: BatchResult | None = None,
+        threads: int = 1,
+    ) -> BatchResult:
+        """Evaluate every criterion at every configuration; see `evaluate_batch`."""
+        q = self._checked(configurations)
+        threads = whole_number(threads, "threads")
+        result = self.empty(len(q)) if out is None else self._fitting(out, len(q))
+        doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
+        if not self.fallback_reason and len(q):
+            self._fill(q, result, doubtful, threads)
+        return self._answered(q, result, doubtful)
+
+    def one(self, q: np.ndarray) -> BatchResult:
+        """Evaluate one configuration (nq,), for a controller's loop: no array is allocated.
+
+        Returns:
+            One row, overwritten by the next call.
+
+        Raises:
+            InvalidInputError: a configuration that is not a contiguous array of nq floats, not
+                finite or not normalised.
+        """
+        if self._single is None:
+            self._single = _Single(self)
+        row = q if _is_row(q, self._nq) else self.stance.robot.check_configuration(q)
+        if not self._single.evaluate(row):
+            return self._single.result
+        self.stance.robot.check_configuration(row)
+        return self._answered(self._single.q, self._single.result, self._single.doubtful)
+
+    def _fill(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
+        """Have the kernel fill the results, block by block."""
+        fill, blocks = self._kernel.filling(q, result, doubtful), -(-len(q) // _CHUNK)
+
+        def run(share: int) -> None:
+            W = self._kernel.workspace()
+            for block in range(share, blocks, threads):
+                fill(W, block * _CHUNK, min((block + 1) * _CHUNK, len(q)))
+
+        if threads == 1:
+            run(0)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(run, range(threads)))
+
+    def _answered(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray) -> BatchResult:
+        """The result, its doubtful rows filled by the reference."""
+        reasons = {}
+        for i, j in np.argwhere(doubtful):
+            row, column = int(i), int(j)
+            reason = fill_row(self.stance, q[row], self.criteria[column], result, row, column)
+            if reason:
+                reasons[row, column] = reason
+        return replace(result, reasons=reasons)
+
+    def _checked(self, configurations: ArrayLike) -> Float[np.ndarray, "N nq"]:
+        robot, nq = self.stance.robot, self._nq
+        what = f"the configurations of robot {robot.name!r}"
+        q = configurations
+        if not (_is_plain(q) and q.shape[1] == nq and np.isfinite(q).all()):
+            q = finite_array(configurations, what, (None, nq), "one configuration in each row")
+        # An array that differs in any of these would have the kernel compiled once more.
+        q = np.require(q, np.float64, ["C", "A", "W", "E"])
+        if robot.base_nv == 6:
+            length = np.einsum("ij,ij->i", q[:, 3:7], q[:, 3:7])
+            bad = np.flatnonzero(np.abs(length - 1.0) > _UNIT)
+            for row in bad:  # the robot's own check words the error
+                try:
+                    robot.check_configuration(q[row])
+                except InvalidInputError as error:
+                    raise InvalidInputError(f"row {row}: {error}") from None
+        return q
+
+    def _fitting(self, out: BatchResult, count: int) -> BatchResult:
+        remedy = f"Make it with BatchKernel.empty({count})."
+        if not isinstance(out, BatchResult):
+            raise InvalidInputError(f"out is of type {type(out).__name__}. {remedy}")
+        for name, array in arrays_of(out).items():
+            wanted = self._expected[name]
+            first = 0 if name in GAINS and not self.gains else count
+            shape = (first, *wanted.shape[1:])
+            fits = array.shape == shape and array.dtype == wanted.dtype
+            if not (fits and array.flags.carray):
+                raise InvalidInputError(
+                    f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
+                    f"writeable; the batch needs {wanted.dtype} of shape {shape}. {remedy}"
+                )
+        if out.criteria != self.names:
+            raise InvalidInputError(
+                f"out holds the criteria {', '.join(out.criteria)}, the batch "
+                f"{', '.join(self.names)}. {remedy}"
+            )
+        return out
+
+
+class _Single:
+    """The memory of a kernel that is called for one configuration at a time.
+
+    Attributes:
+        q: the configuration (1, nq).
+        result: one row, overwritten by every call.
+        doubtful: above zero where the reference must answer, by criterion (1, nk).
+    """
+
+    def __init__(self, kernel: BatchKernel) -> None:
+        """Allocate it, and take hold of the machine code."""
+        self.q, self.result = np.zeros((1, kernel._nq)), kernel.empty(1)
+        self.doubtful = np.ones((1, len(kernel.names)), dtype=np.uint8)
+        self._fill: Callable[[np.ndarray, int, int], None] | None = None
+        if not kernel.fallback_reason:
+            self._fill = kernel._kernel.filling(self.q, self.result, self.doubtful)
+            self._W = kernel._kernel.workspace()
+
+    def evaluate(self, q: np.ndarray) -> bool:
+        """Fill the result for a configuration (nq,); whether any criterion is in doubt."""
+        self.q[0] = q
+        if self._fill is None:
+            return True
+        self._fill(self._W, 0, 1)
+        return bool(self.doubtful.any())
+
+
+def evaluate_batch(
+    stance: Stance,
+    configurations: ArrayLike,
+    criteria: Sequence[Criterion | WrenchPolicy],
+    *,
+    gains: bool = True,
+    out: BatchResult | None = None,
+    threads: int = 1,
+) -> BatchResult:
+    """Equilibria and sensitivities of many postures.
+
+    Args:
+        stance: gives robot and contacts; its own configuration does not matter.
+        configurations: one in each row (N, nq).
+        criteria: criteria of distinct names, or policies q -> wrenches.
+        gains: compute CoM gain, CoM travel and tipping edge too.
+        out: results of the same shape to overwrite, so that nothing is allocated.
+        threads: threads that share the postures; the results do not depend on it.
+
+    Returns:
+        Results equal to `cop_sensitivity`'s of every row. A row for which it raises is NaN and has
+        its reason in `BatchResult.reasons`.
+
+    Raises:
+        InvalidInputError: configurations of the wrong shape, not finite or not normalised;
+            criteria that do not fit; `out` of another shape.
+    """
+    batch = BatchKernel(stance, criteria, gains=gains)
+    return batch.evaluate(configurations, out=out, threads=threads)
+
+
+def _is_row(value: object, nq: int) -> bool:
+    return (
+        isinstance(value, np.ndarray)
+        and value.dtype == np.float64
+        and value.shape == (nq,)
+        and value.flags.c_contiguous
+    )
+
+
+def _is_plain(value: object) -> TypeGuard[np.ndarray]:
+    return isinstance(value, np.ndarray) and value.dtype == np.float64 and value.ndim == 2

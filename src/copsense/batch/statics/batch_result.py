@@ -1,0 +1,112 @@
+"""Batch result: equilibria and sensitivities in arrays, the posture first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from copsense.stance import Stance
+
+
+@dataclass(frozen=True, eq=False)
+class BatchResult:
+    """Equilibria and sensitivities of N postures under nk criteria.
+
+    A row that failed is NaN throughout, and `reasons` says why.
+
+    Attributes:
+        criteria: their names.
+        contacts: names of the contacts.
+        wrenches: of the environment on the robot, contact axes, force first [N, Nm].
+        torques: joint torques [Nm, or N for a prismatic joint].
+        cops: centres of pressure, contact axes [m].
+        gradient: of the CoPs over velocities, projected on the admissible motions, as
+            `CopSensitivity.gradient`.
+        com_gain: d cop / d CoM, as `CopSensitivity.com_gain`; empty where not asked for.
+        com_travel: first-order distance of the CoM to tipping, as `CopSensitivity.com_travel` [m];
+            empty where not asked for.
+        tipping_edge: index of the sole's edge that it goes to, as `CopSensitivity.tipping_edge`; -1
+            where it goes to none, empty where not asked for.
+        margin: signed distance of each CoP to its sole's nearest edge [m]; infinite without a sole.
+        load_share: f_z / (m g) of each contact.
+        com: centre of mass in the world [m].
+        reasons: (posture, criterion index) -> why that row failed.
+    """
+
+    criteria: tuple[str, ...]
+    contacts: tuple[str, ...]
+    wrenches: Float[np.ndarray, "N nk nc 6"]
+    torques: Float[np.ndarray, "N nk n"]
+    cops: Float[np.ndarray, "N nk nc 2"]
+    gradient: Float[np.ndarray, "N nk nc 2 nv"]
+    com_gain: Float[np.ndarray, "G nk nc 2 2"]
+    com_travel: Float[np.ndarray, "G nk nc"]
+    tipping_edge: Int[np.ndarray, "G nk nc"]
+    margin: Float[np.ndarray, "N nk nc"]
+    load_share: Float[np.ndarray, "N nk nc"]
+    com: Float[np.ndarray, "N 3"]
+    reasons: Mapping[tuple[int, int], str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Number of postures."""
+        return len(self.com)
+
+    def __repr__(self) -> str:
+        """Its size, criteria and contacts."""
+        failed = f", {len(self.reasons)} failed" if self.reasons else ""
+        return (
+            f"BatchResult({len(self)} postures{failed}; criteria {', '.join(self.criteria)}; "
+            f"contacts {', '.join(self.contacts)})"
+        )
+
+    @property
+    def nbytes(self) -> int:
+        """Size of all arrays [B]."""
+        return sum(array.nbytes for array in arrays_of(self).values())
+
+
+GAINS = ("com_gain", "com_travel", "tipping_edge")
+"""Arrays that a batch fills only where it is asked for them."""
+
+
+def nothing(name: str) -> float:
+    """What an array holds where there is no answer."""
+    return -1 if name == "tipping_edge" else np.nan
+
+
+def array_names() -> tuple[str, ...]:
+    """Names of a result's arrays."""
+    others = ("criteria", "contacts", "reasons")
+    return tuple(f.name for f in fields(BatchResult) if f.name not in others)
+
+
+def arrays_of(result: BatchResult) -> dict[str, np.ndarray]:
+    """A result's arrays by name."""
+    return {name: getattr(result, name) for name in array_names()}
+
+
+def empty_result(
+    stance: Stance, criteria: tuple[str, ...], count: int, *, gains: bool
+) -> BatchResult:
+    """A result of NaN rows to be filled."""
+    nk, nc, nv = len(criteria), len(stance.contacts), stance.robot.model.nv
+    n = len(stance.robot.torque_names)
+    counted = count if gains else 0
+    shapes = {
+        "wrenches": (count, nk, nc, 6),
+        "torques": (count, nk, n),
+        "cops": (count, nk, nc, 2),
+        "gradient": (count, nk, nc, 2, nv),
+        "com_gain": (counted, nk, nc, 2, 2),
+        "com_travel": (counted, nk, nc),
+        "tipping_edge": (counted, nk, nc),
+        "margin": (count, nk, nc),
+        "load_share": (count, nk, nc),
+        "com": (count, 3),
+    }
+    arrays: dict[str, Any] = {name: np.full(shape, nothing(name)) for name, shape in shapes.items()}
+    return BatchResult(criteria, stance.contact_names, **arrays)

@@ -1,0 +1,55 @@
+"""Compiled kernel: the machine code, and the arrays that it reads and fills as it takes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from copsense.batch.layout import RobotLayout
+from copsense.batch.statics.batch_result import BatchResult, arrays_of
+from copsense.batch.statics.criteria import KernelCriteria
+from copsense.batch.workspace import workspace, workspace_offsets
+
+
+class CompiledKernel:
+    """The kernel for a robot, its contacts and some criteria; compiled when first called."""
+
+    def __init__(self, layout: RobotLayout, criteria: KernelCriteria, nq: int) -> None:
+        """Lay out the memory."""
+        self._offset = workspace_offsets(layout, nq)
+        self._given = (*layout.parts, criteria, self._offset)
+        self._code: Callable[..., None] | None = None
+
+    def workspace(self) -> np.ndarray:
+        """Memory for one thread."""
+        return workspace(self._offset.size)
+
+    def filling(
+        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray
+    ) -> Callable[[np.ndarray, int, int], None]:
+        """A function of a workspace, a first row and an end, that fills these rows.
+
+        Args:
+            q: configurations (N, nq), contiguous.
+            result: of N rows.
+            doubtful: set above zero where the reference must answer (N, nk).
+        """
+        from copsense.batch.compiler import bound
+        from copsense.batch.statics.kernel import Out, evaluate_postures
+
+        arrays: dict[str, Any] = {
+            n: a if n == "com" else _flat(a) for n, a in arrays_of(result).items()
+        }
+        arguments = (*self._given, q, Out(**arrays, doubtful=doubtful))
+        if self._code is None:
+            self._code = bound(evaluate_postures, (*arguments, self.workspace(), 0, 0))
+        return partial(self._code, *arguments)
+
+
+def _flat(array: np.ndarray) -> np.ndarray:
+    """The same memory with one axis after posture and criterion (-1 fails on empty arrays)."""
+    return array.reshape(*array.shape[:2], math.prod(array.shape[2:]))

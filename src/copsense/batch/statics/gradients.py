@@ -1,0 +1,242 @@
+"""Gradients: every CoP's sensitivity ([Romano2016] Eq. (11)) by adjoints, one sweep each.
+
+A CoP coordinate changes as dp = l . df, l its covector on the wrenches. Let mu be the internal
+wrenches (sum mu_k = 0) that the criterion's curvature H answers to l with, H(mu, .) + l = xi on
+every contact, xi one twist for all. Differentiating the criterion's condition along mu leaves
+
+    dp = xi . db + sum_i [lambda_i (dG_i - ds_i . phi_i) - nu_i ds_i . mu_i],
+    nu_i = w_i tau_i,  lambda_i = -w_i s_i . mu_i      (phi_i, mu_i: sums over what joint i carries)
+
+and no derivative of an inverse. With Omega_i = xi's rotation + sum lambda_j a_j down to body i and
+Jacobi's identity, what is left per joint is the covector
+
+    dp/dq_i = dh/dq_i . (Omega_parent x g) + s_i . sum of T_j over what joint i carries,
+    T_j = -lambda_j ([0; dh/dq_j x g] + s_j x* phi_j) - nu_j s_j x* mu_j.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from copsense.batch.compiler import compiled
+from copsense.batch.kinematics import screw_cross
+from copsense.batch.lanes import load, splat, store
+from copsense.batch.layout import PRISMATIC, Feet, Tree
+from copsense.batch.statics.com_gains import along_motions
+from copsense.batch.statics.criteria import WEIGHTED, KernelCriteria
+from copsense.batch.statics.load_sharing import across_symmetric
+from copsense.batch.statics.loops import expand, gather_groups, times_lower, times_upper
+from copsense.batch.statics.tangents import project, store_base
+from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, store3, sub3
+from copsense.batch.workspace import Offsets
+
+LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight
+
+
+@compiled
+def wrench_gradients(
+    tree: Tree, feet: Feet, offset: Offsets, W: Any, arm: float, gains: bool
+) -> None:
+    """Gradients under the minimum wrench, which follow the centre of mass alone.
+
+    dp = beta . dM_c with dM_c = -dh x g, so dp = dh . (beta x g); for p_x (p_y alike, with x)
+    beta = I^-1 (-L^2 y - p_x (rho x z)) / f_z, for the contact's share of the weight, which only
+    the gains need, beta = I^-1 (rho x z) / (m g).
+    """
+    nv = len(tree.parent) + 5
+    g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
+    first, second = tree.level[0], tree.level[1]
+    for k in range(len(feet.body)):
+        if feet.point[k]:
+            _stand_still(offset, W, k, nv)
+            continue
+        axes = offset.foot_rotation + 9 * k
+        z = load3(W, axes + 6)
+        lean = cross3(sub3(load3(W, offset.foot + 3 * k), load3(W, offset.middle)), z)
+        share = 1.0 / load(W, offset.contact_wrench + 6 * k + 2)
+        for output in range(_outputs(feet, k, gains)):
+            if output == LOAD:
+                v = scale3(1.0 / feet.weight, lean)
+            else:
+                p = load(W, offset.cop + 2 * k + output)
+                own = scale3(arm, load3(W, axes))
+                if output == 0:
+                    own = scale3(-arm, load3(W, axes + 3))
+                v = scale3(share, sub3(own, scale3(p, lean)))
+            u = cross3(across_symmetric(W, offset.middle + 3, v), g)
+            a = u[0] * first[0] + u[1] * first[1] + u[2] * first[2]
+            b = u[0] * second[0] + u[1] * second[1] + u[2] * second[2]
+            at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
+            for i in range(nv):
+                store(W, at + i, a * load(W, offset.level + i) + b * load(W, offset.level + nv + i))
+            if output == LOAD:
+                along_motions(offset, W, at, offset.load_gain + 2 * k, nv)
+
+
+@compiled
+def _outputs(feet: Feet, k: int, gains: bool) -> int:
+    """How many gradients a surface contact has: its share of the weight where it may tip."""
+    return 3 if gains and feet.edge_first[k] < feet.edge_first[k + 1] else 2
+
+
+@compiled
+def _stand_still(offset: Offsets, W: Any, k: int, nv: int) -> None:
+    """A point contact's CoP is its origin."""
+    for i in range(2 * nv):
+        store(W, offset.gradient + 2 * nv * k + i, splat(0.0))
+
+
+@compiled
+def torque_gradients(
+    tree: Tree,
+    feet: Feet,
+    offset: Offsets,
+    W: Any,
+    criteria: KernelCriteria,
+    index: int,
+    gains: bool,
+) -> None:
+    """Gradients under a criterion of weighted torques, and wrenches."""
+    nv = len(tree.parent) + 5
+    _lever_arms(tree, feet, offset, W)
+    for k in range(len(feet.body)):
+        if feet.point[k]:
+            _stand_still(offset, W, k, nv)
+            continue
+        for output in range(_outputs(feet, k, gains)):
+            at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
+            _adjoint(tree, feet, offset, W, criteria, index, k, output)
+            _sweep(tree, feet, offset, W, criteria, index, at)
+            if output == LOAD:
+                # The motions it meets are admissible: nothing has to be projected.
+                for t in range(len(feet.support)):
+                    store(W, at + 5 + feet.support[t], load(W, offset.felt + t))
+                along_motions(offset, W, at, offset.load_gain + 2 * k, nv)
+            else:
+                project(feet, offset, W, at, offset.felt)
+
+
+@compiled
+def _lever_arms(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
+    """A_j = [0; dh/dq_j x g] + s_j x* phi_j, the same for every output."""
+    for t in range(len(feet.support)):
+        i, phi = feet.support[t], offset.group + 6 * feet.group[t]
+        F, M = screw_cross(W, offset.screw + 6 * i, load3(W, phi), load3(W, phi + 3))
+        store3(W, offset.lever_arm + 6 * t, F)
+        store3(W, offset.lever_arm + 6 * t + 3, add3(M, load3(W, offset.weight + 3 * i)))
+
+
+@compiled
+def _covector(feet: Feet, offset: Offsets, W: Any, k: int, output: int) -> Any:
+    """l of p_x = -m_y / f_z, p_y = m_x / f_z or f_z / (m g), on the wrench about the base's origin.
+
+    The first two give the change of a quotient: -p / f_z times that of f_z, and the moment's.
+    """
+    axes = offset.foot_rotation + 9 * k
+    if output == LOAD:
+        zero = splat(0.0)
+        return scale3(1.0 / feet.weight, load3(W, axes + 6)), (zero, zero, zero)
+    share = 1.0 / load(W, offset.contact_wrench + 6 * k + 2)
+    p = load(W, offset.cop + 2 * k + output)
+    force = scale3(-(p * share), load3(W, axes + 6))
+    moment = scale3(-share, load3(W, axes + 3)) if output == 0 else scale3(share, load3(W, axes))
+    return add3(force, cross3(load3(W, offset.foot + 3 * k), moment)), moment
+
+
+@compiled
+def _adjoint(
+    tree: Tree,
+    feet: Feet,
+    offset: Offsets,
+    W: Any,
+    criteria: KernelCriteria,
+    index: int,
+    k: int,
+    output: int,
+) -> None:
+    """mu (into `inner`) and xi (into `twist`) of one output.
+
+    mu = N z with the internal wrenches N of the unknowns: R' R z = -N' l.
+    """
+    ns, r, held = len(feet.support), feet.unknowns, feet.order[0]
+    weighted = criteria.kind[index] == WEIGHTED
+    v, w = _covector(feet, offset, W, k, output)
+    for j in range(r):
+        store(W, offset.unknown + j, splat(0.0))
+    for e in feet.order[1:]:
+        # The held contact feels the opposite of every other.
+        if e == k or held == k:
+            sign = -1.0 if e == k else 1.0
+            at, own = offset.unknown + feet.first[e], v
+            if feet.point[e]:
+                own = add3(v, cross3(w, load3(W, offset.foot + 3 * e)))
+            store3(W, at, scale3(sign, own))
+            if not feet.point[e]:
+                store3(W, at + 3, scale3(sign, w))
+    T = offset.Tw if weighted else offset.T
+    times_lower(W, T, offset.unknown, r)
+    times_upper(W, T, offset.unknown, r)
+    expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
+    gather_groups(feet, W, offset.inner, offset.inner_group)
+    if held != k:
+        v, w = scale3(0.0, v), scale3(0.0, w)
+    if weighted:
+        # W_f mu of the held contact, moved to the base's origin.
+        F, M = load3(W, offset.inner + 6 * held), load3(W, offset.inner + 6 * held + 3)
+        r_held = load3(W, offset.foot + 3 * held)
+        m = scale3(criteria.moment[index], sub3(M, cross3(r_held, F)))
+        v = add3(v, add3(scale3(criteria.force[index], F), cross3(r_held, m)))
+        w = add3(w, m)
+    for t in range(ns):
+        i, mu = feet.support[t], offset.inner_group + 6 * feet.group[t]
+        s = offset.screw + 6 * i
+        change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
+        weight = criteria.joint[index, i] if weighted else 1.0
+        rate = change * (-weight)
+        store(W, offset.rate + t, rate)
+        if feet.member[feet.group[t], held]:
+            w = sub3(w, scale3(rate, load3(W, s + 3)))
+    store3(W, offset.twist, w)  # of xi only the rotation matters: gravity is the same everywhere
+
+
+@compiled
+def _sweep(
+    tree: Tree, feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int, at: int
+) -> None:
+    """One output's gradient (nv,) at row `at`, base in world axes, not yet projected."""
+    ns = len(feet.support)
+    weighted = criteria.kind[index] == WEIGHTED
+    g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
+    base = load3(W, offset.twist)
+    store_base(tree, offset, W, at, cross3(base, g))
+    for t in range(ns):
+        i, up = feet.support[t], feet.anchor[feet.support[t]]
+        omega = load3(W, offset.turning + 3 * up) if up >= 0 else base
+        rate = load(W, offset.rate + t)
+        store(W, offset.felt + t, -dot3(omega, load3(W, offset.weight + 3 * i)))
+        if tree.kind[i] != PRISMATIC:
+            omega = add3(omega, scale3(rate, load3(W, offset.screw + 6 * i + 3)))
+        store3(W, offset.turning + 3 * t, omega)
+        mu = offset.inner_group + 6 * feet.group[t]
+        F, M = screw_cross(W, offset.screw + 6 * i, load3(W, mu), load3(W, mu + 3))
+        nu = load(W, offset.torque + i)
+        if weighted:
+            nu = nu * criteria.joint[index, i]
+        A = offset.lever_arm + 6 * t
+        F = scale3(-1.0, add3(scale3(rate, load3(W, A)), scale3(nu, F)))
+        M = scale3(-1.0, add3(scale3(rate, load3(W, A + 3)), scale3(nu, M)))
+        store3(W, offset.pull + 6 * t, F)
+        store3(W, offset.pull + 6 * t + 3, M)
+    for t in range(ns - 1, -1, -1):
+        i, up = feet.support[t], feet.anchor[feet.support[t]]
+        s, T = offset.screw + 6 * i, offset.pull + 6 * t
+        F, M = load3(W, T), load3(W, T + 3)
+        power = dot3(load3(W, s), F) + dot3(load3(W, s + 3), M)
+        store(W, offset.felt + t, load(W, offset.felt + t) + power)
+        above = offset.pull + 6 * up if up >= 0 else at
+        store3(W, above, add3(load3(W, above), F))
+        store3(W, above + 3, add3(load3(W, above + 3), M))
+    for i in feet.rest:
+        up = feet.anchor[i]
+        omega = load3(W, offset.turning + 3 * up) if up >= 0 else base
+        store(W, at + 5 + i, -dot3(omega, load3(W, offset.weight + 3 * i)))

@@ -1,0 +1,192 @@
+"""Load sharing: the wrenches and torques that a criterion chooses ([Romano2016] Eq. (7), (9)).
+
+Minimum wrench, a moment counting as a force at the arm L, has a closed form. With rho_k from the
+contacts' centroid c and M_c the moment that they must supply about it,
+
+    F_k = F / nc + alpha x rho_k,    M_k = L^2 alpha (surfaces),
+    alpha = (sum |rho_k|^2 1 - rho_k rho_k' + n_s L^2 1)^-1 M_c:
+
+a 3 x 3 system, in which the posture appears through its centre of mass alone. Minimum torque is
+the least squares min |W^(1/2) (tau_0 - B y)| on the loop matrix, tau_0 = G - D b; a mixture adds
+the wrenches' own rows below.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from copsense.batch.compiler import compiled
+from copsense.batch.lanes import load, magnitude, splat, store, where_less
+from copsense.batch.layout import Feet, Tree
+from copsense.batch.statics.criteria import WEIGHTED, KernelCriteria
+from copsense.batch.statics.loops import (
+    expand,
+    factorise,
+    gather_groups,
+    invert_spread,
+    invert_upper,
+    second_moment,
+    times_upper,
+)
+from copsense.batch.vectors import add3, along, cross3, dot3, load3, scale3, store3, sub3
+from copsense.batch.workspace import Offsets
+
+_UNLOADED = 2e-9  # share of the weight; nearer to none, the reference decides
+
+
+@compiled
+def set_load(tree: Tree, offset: Offsets, W: Any) -> None:
+    """b: the contacts must carry the weight, (F, M) = -(m g, h x g)."""
+    g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
+    store3(W, offset.load, scale3(-tree.carried[0], g))
+    store3(W, offset.load + 3, cross3(g, load3(W, offset.first_moment)))
+    for j in range(6):
+        store(W, offset.nothing + j, splat(0.0))
+
+
+@compiled
+def least_wrench(feet: Feet, offset: Offsets, W: Any, arm: float) -> None:
+    """Wrenches of least norm, `arm` = L^2; keeps c and the inverse of the 3 x 3 matrix."""
+    nc = len(feet.body)
+    zero = splat(0.0)
+    c = (zero, zero, zero)
+    surfaces = 0
+    for k in range(nc):
+        c = add3(c, load3(W, offset.foot + 3 * k))
+        surfaces += 1 - feet.point[k]
+    c = scale3(1.0 / nc, c)
+    own = splat(surfaces * arm)
+    I = (own, own, own, zero, zero, zero)
+    for k in range(nc):
+        s = second_moment(sub3(load3(W, offset.foot + 3 * k), c))
+        I = (I[0] + s[0], I[1] + s[1], I[2] + s[2], I[3] + s[3], I[4] + s[4], I[5] + s[5])
+    store3(W, offset.middle, c)
+    invert_spread(W, offset.middle + 3, I)
+    F, M = load3(W, offset.load), load3(W, offset.load + 3)
+    alpha = across_symmetric(W, offset.middle + 3, sub3(M, cross3(c, F)))
+    for k in range(nc):
+        r = load3(W, offset.foot + 3 * k)
+        f = add3(scale3(1.0 / nc, F), cross3(alpha, sub3(r, c)))
+        m = cross3(r, f)
+        if not feet.point[k]:
+            m = add3(m, scale3(arm, alpha))
+        store3(W, offset.wrench + 6 * k, f)
+        store3(W, offset.wrench + 6 * k + 3, m)
+
+
+@compiled
+def across_symmetric(W: Any, row: int, a: Any) -> Any:
+    """A a of a symmetric A in nine rows."""
+    return (
+        dot3(load3(W, row), a),
+        dot3(load3(W, row + 3), a),
+        dot3(load3(W, row + 6), a),
+    )
+
+
+@compiled
+def least_squares(
+    feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int
+) -> None:
+    """Wrenches of least weighted torque, and of least cost where the wrenches count too."""
+    ns, r = len(feet.support), feet.unknowns
+    weighted = criteria.kind[index] == WEIGHTED
+    # Torques that the held contacts alone would leave: tau_0 = G - D b.
+    for t in range(ns):
+        tau = load(W, offset.gravity + feet.support[t])
+        for j in range(6):
+            tau = tau - load(W, offset.held_row + 6 * t + j) * load(W, offset.load + j)
+        if weighted:
+            tau = tau * np.sqrt(criteria.joint[index, feet.support[t]])
+        store(W, offset.right + t, tau)
+    Q, T, m = offset.Q, offset.T, ns
+    if weighted:
+        Q, T, m = offset.Qw, offset.Tw, ns + 6 * len(feet.body)
+        _weigh(feet, offset, W, criteria, index)
+    for i in range(r):
+        s = load(W, Q + m * i) * load(W, offset.right)
+        for t in range(1, m):
+            s = s + load(W, Q + m * i + t) * load(W, offset.right + t)
+        store(W, offset.unknown + i, s)
+    times_upper(W, T, offset.unknown, r)
+    expand(feet, offset, W, offset.unknown, offset.load, offset.wrench)
+
+
+@compiled
+def _weigh(feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int) -> None:
+    """The weighted loop matrix and its factors, the wrenches' rows below the torques'.
+
+    Its columns are what each unknown alone does: B = Q R again for the torques.
+    """
+    ns, r, nc = len(feet.support), feet.unknowns, len(feet.body)
+    m = ns + 6 * nc
+    for i in range(r):
+        column = offset.Qw + m * i
+        for t in range(ns):
+            s = load(W, offset.Q + t) * load(W, offset.R + i)
+            for k in range(1, i + 1):
+                s = s + load(W, offset.Q + ns * k + t) * load(W, offset.R + r * k + i)
+            store(W, column + t, s * np.sqrt(criteria.joint[index, feet.support[t]]))
+        for k in range(r):
+            store(W, offset.unknown + k, splat(1.0 if k == i else 0.0))
+        expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
+        _wrench_rows(feet, offset, W, criteria, index, offset.inner, column + ns, 1.0)
+    for k in range(r):
+        store(W, offset.unknown + k, splat(0.0))
+    expand(feet, offset, W, offset.unknown, offset.load, offset.inner)
+    _wrench_rows(feet, offset, W, criteria, index, offset.inner, offset.right + ns, -1.0)
+    lost = factorise(W, offset.Qw, offset.Rw, m, r)
+    invert_upper(W, offset.Rw, offset.Tw, r)
+    store(W, offset.doubt, where_less(lost, 0.5, load(W, offset.doubt), splat(1.0)))
+
+
+@compiled
+def _wrench_rows(
+    feet: Feet,
+    offset: Offsets,
+    W: Any,
+    criteria: KernelCriteria,
+    index: int,
+    wrenches: int,
+    at: int,
+    sign: float,
+) -> None:
+    """sign W_f^(1/2) f of wrenches phi: forces, and moments about the contacts' own origins."""
+    force, moment = sign * np.sqrt(criteria.force[index]), sign * np.sqrt(criteria.moment[index])
+    for k in range(len(feet.body)):
+        F, M = load3(W, wrenches + 6 * k), load3(W, wrenches + 6 * k + 3)
+        store3(W, at + 6 * k, scale3(force, F))
+        if feet.point[k]:
+            store3(W, at + 6 * k + 3, scale3(0.0, F))
+        else:
+            own = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
+            store3(W, at + 6 * k + 3, scale3(moment, own))
+
+
+@compiled
+def finish(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
+    """Torques, wrenches in contact axes and centres of pressure ([Romano2016] Eq. (10))."""
+    gather_groups(feet, W, offset.wrench, offset.group)
+    for i in range(1, len(tree.parent)):
+        store(W, offset.torque + i, load(W, offset.gravity + i))
+    for t in range(len(feet.support)):
+        i, g = feet.support[t], offset.group + 6 * feet.group[t]
+        s = offset.screw + 6 * i
+        power = dot3(load3(W, s), load3(W, g)) + dot3(load3(W, s + 3), load3(W, g + 3))
+        store(W, offset.torque + i, load(W, offset.gravity + i) - power)
+    doubt = load(W, offset.doubt)
+    for k in range(len(feet.body)):
+        F, M = load3(W, offset.wrench + 6 * k), load3(W, offset.wrench + 6 * k + 3)
+        f = along(W, offset.foot_rotation + 9 * k, F)
+        m = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
+        m = along(W, offset.foot_rotation + 9 * k, m)
+        if feet.point[k]:
+            m = scale3(0.0, f)
+        store3(W, offset.contact_wrench + 6 * k, f)
+        store3(W, offset.contact_wrench + 6 * k + 3, m)
+        store(W, offset.cop + 2 * k, -(m[1] / f[2]))
+        store(W, offset.cop + 2 * k + 1, m[0] / f[2])
+        doubt = where_less(_UNLOADED * feet.weight, magnitude(f[2]), doubt, splat(1.0))
+    store(W, offset.doubt, doubt)

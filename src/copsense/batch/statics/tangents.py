@@ -1,0 +1,121 @@
+"""Tangents: the projection of gradients onto the admissible motions.
+
+The contact Jacobian's rows are spanned by (0, Q) and (1, D), base first. Taking Q off D leaves
+(1, C) with C = (1 - Q Q') D, orthogonal to the former and well conditioned whatever the posture:
+its Gram matrix is 1 + C' C >= 1. So the projection of a gradient (u, g) is
+
+    g -= Q Q' g;   (u, g) -= (1, C) (1 + C' C)^-1 (u + C' g).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from copsense.batch.compiler import compiled
+from copsense.batch.lanes import load, root, splat, store
+from copsense.batch.layout import Feet, Tree
+from copsense.batch.vectors import cross3, dot3, load3, store3
+from copsense.batch.workspace import Offsets
+
+
+@compiled
+def span(feet: Feet, offset: Offsets, W: Any) -> None:
+    """C, and the inverse L^-1 of the Cholesky factor of 1 + C' C."""
+    ns = len(feet.support)
+    for j in range(6):
+        c = offset.C + ns * j
+        for t in range(ns):
+            store(W, c + t, load(W, offset.held_row + 6 * t + j))
+        _remove(feet, offset, W, c)
+    for i in range(6):
+        for j in range(i + 1):
+            s = splat(1.0 if i == j else 0.0)
+            for t in range(ns):
+                s = s + load(W, offset.C + ns * i + t) * load(W, offset.C + ns * j + t)
+            for k in range(j):
+                s = s - load(W, offset.L + 6 * i + k) * load(W, offset.L + 6 * j + k)
+            if i == j:
+                store(W, offset.L + 6 * i + i, 1.0 / root(s))  # the diagonal is kept inverted
+            else:
+                store(W, offset.L + 6 * i + j, s * load(W, offset.L + 6 * j + j))
+    for i in range(1, 6):
+        for j in range(i):
+            s = load(W, offset.L + 6 * i + j) * load(W, offset.L + 6 * j + j)
+            for k in range(j + 1, i):
+                s = s + load(W, offset.L + 6 * i + k) * load(W, offset.L + 6 * k + j)
+            store(W, offset.L + 6 * i + j, -(s * load(W, offset.L + 6 * i + i)))
+
+
+@compiled
+def _remove(feet: Feet, offset: Offsets, W: Any, g: int) -> None:
+    """g -= Q Q' g. Q is orthonormal: no product has to wait for another."""
+    ns, r = len(feet.support), feet.unknowns
+    for k in range(r):
+        q = offset.Q + ns * k
+        c = load(W, q) * load(W, g)
+        for t in range(1, ns):
+            c = c + load(W, q + t) * load(W, g + t)
+        store(W, offset.along + k, c)
+    for t in range(ns):
+        s = load(W, g + t)
+        for k in range(r):
+            s = s - load(W, offset.along + k) * load(W, offset.Q + ns * k + t)
+        store(W, g + t, s)
+
+
+@compiled
+def project(feet: Feet, offset: Offsets, W: Any, gradient: int, felt: int) -> None:
+    """Project a gradient (nv,), base part in world axes; `felt` holds it on the support joints."""
+    ns = len(feet.support)
+    _remove(feet, offset, W, felt)
+    y, z = offset.six, offset.six + 6
+    for i in range(6):
+        s = load(W, gradient + i)
+        for t in range(ns):
+            s = s + load(W, offset.C + ns * i + t) * load(W, felt + t)
+        store(W, y + i, s)
+    for i in range(6):
+        s = load(W, offset.L + 6 * i) * load(W, y)
+        for k in range(1, i + 1):
+            s = s + load(W, offset.L + 6 * i + k) * load(W, y + k)
+        store(W, z + i, s)
+    for i in range(6):
+        s = load(W, offset.L + 6 * i + i) * load(W, z + i)
+        for k in range(i + 1, 6):
+            s = s + load(W, offset.L + 6 * k + i) * load(W, z + k)
+        store(W, y + i, s)
+        store(W, gradient + i, load(W, gradient + i) - s)
+    for t in range(ns):
+        s = load(W, felt + t)
+        for i in range(6):
+            s = s - load(W, y + i) * load(W, offset.C + ns * i + t)
+        store(W, gradient + 5 + feet.support[t], s)
+
+
+@compiled
+def level_gradients(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
+    """Projected gradients of h . t for the two level directions t: of the CoM, times the mass."""
+    n = len(tree.parent) - 1
+    for j in range(2):
+        t = (splat(tree.level[j, 0]), splat(tree.level[j, 1]), splat(tree.level[j, 2]))
+        at = offset.level + (n + 6) * j
+        store_base_and_joints(tree, offset, W, at, t)
+        for k in range(len(feet.support)):
+            store(W, offset.felt + k, load(W, at + 5 + feet.support[k]))
+        project(feet, offset, W, at, offset.felt)
+
+
+@compiled
+def store_base_and_joints(tree: Tree, offset: Offsets, W: Any, at: int, u: Any) -> None:
+    """Gradient (nv,) of h . u at fixed u: the base in world axes, then the joints."""
+    store_base(tree, offset, W, at, u)
+    for i in range(1, len(tree.parent)):
+        store(W, at + 5 + i, dot3(load3(W, offset.moment_rate + 3 * i), u))
+
+
+@compiled
+def store_base(tree: Tree, offset: Offsets, W: Any, at: int, u: Any) -> None:
+    """The base's part of it (6,)."""
+    m = tree.carried[0]
+    store3(W, at, (m * u[0], m * u[1], m * u[2]))
+    store3(W, at + 3, cross3(load3(W, offset.first_moment), u))

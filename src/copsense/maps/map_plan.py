@@ -1,0 +1,80 @@
+"""Map plan: everything that decides what a map holds, as a value and as readable parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from copsense._version import __version__
+from copsense.arrays import whole_number
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError
+from copsense.limits import Limits
+from copsense.maps.sampling import Sample, Sampling
+from copsense.provenance import model_digest, plain
+from copsense.stance import Stance
+
+FORMAT = 2  # of the store; counted up when what is written changes
+
+
+@dataclass(frozen=True, eq=False)
+class MapPlan:
+    """What to map, and in which pieces.
+
+    Attributes:
+        stance: robot, contacts, and what the coordinates not named keep.
+        criteria: of distinct names.
+        sampling: which postures.
+        limits: what the wrenches must respect, or None.
+        chunk: postures of a chunk, the unit that is written and resumed.
+        configurations: whether the configurations are stored too.
+    """
+
+    stance: Stance
+    criteria: tuple[Criterion, ...]
+    sampling: Sampling
+    limits: Limits | None = None
+    chunk: int = 4096
+    configurations: bool = False
+
+    def __post_init__(self) -> None:
+        """Validate the criteria and the size of a chunk."""
+        given = (self.criteria,) if isinstance(self.criteria, Criterion) else self.criteria
+        object.__setattr__(self, "criteria", tuple(given))
+        for criterion in self.criteria:
+            if not isinstance(criterion, Criterion):
+                raise InvalidInputError(
+                    f"a map takes criteria, not {criterion!r}: a policy's code cannot be "
+                    "written into the store. Give Criterion values."
+                )
+        object.__setattr__(self, "chunk", whole_number(self.chunk, "the size of a chunk"))
+        if self.limits is not None and not self.limits.any:
+            object.__setattr__(self, "limits", None)
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return math.ceil(len(self.sampling) / self.chunk)
+
+    def bounds(self, index: int) -> tuple[int, int]:
+        """First posture of a chunk, and the one after its last."""
+        return index * self.chunk, min((index + 1) * self.chunk, len(self.sampling))
+
+    def parameters(self) -> dict[str, Any]:
+        """Everything that decides the numbers, as JSON would hold it."""
+        stance, sampling = self.stance, plain(self.sampling)
+        if isinstance(self.sampling, Sample):  # a seed may be too long for a float
+            sampling |= {"count": int(self.sampling.count), "seed": int(self.sampling.seed)}
+        return {
+            "format": FORMAT,
+            "copsense": __version__,
+            "robot": {"name": stance.robot.name, "model": model_digest(stance)},
+            "configuration": plain(stance.q),
+            "contacts": [plain(c) for c in stance.contacts],
+            "criteria": [plain(c.to_dict()) for c in self.criteria],
+            "limits": plain(self.limits),
+            "sampling": sampling,
+            "chunk": int(self.chunk),
+            "configurations": bool(self.configurations),
+        }

@@ -1,0 +1,193 @@
+"""Map statistics: a whole map in a few numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from copsense.maps.columns import EVALUATED, STATUS
+from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
+from copsense.maps.store import MapStore
+
+LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
+
+
+@dataclass(frozen=True)
+class WorstPosture:
+    """A posture that is among the worst.
+
+    Attributes:
+        posture: its number.
+        coordinates: where it is, by name [m, rad].
+        value: of the quantity there [m, or 1 for a gain].
+        contact: the contact that tips first there; empty for a gain, and where none can tip.
+        tipping_edge: index of its sole's edge that it tips over; -1 likewise.
+    """
+
+    posture: int
+    coordinates: Mapping[str, float]
+    value: float
+    contact: str = ""
+    tipping_edge: int = -1
+
+
+@dataclass(frozen=True)
+class FailedPosture:
+    """The first posture that was not evaluated, of those of one status.
+
+    Attributes:
+        posture: its number.
+        coordinates: where it is, by name [m, rad].
+        reason: why it was not.
+    """
+
+    posture: int
+    coordinates: Mapping[str, float]
+    reason: str
+
+
+@dataclass(frozen=True)
+class CriterionSummary:
+    """A map under one criterion.
+
+    Attributes:
+        counts: postures of each status.
+        worst_travel: the least CoM travels, the worst first.
+        worst_gain: the largest CoM gains, the worst first.
+        travel_percentiles: percent -> the least CoM travel [m] that this share of the evaluated
+            postures does not exceed.
+        gain_percentiles: the same of the largest CoM gain.
+        failed: status -> the first posture of it, with its reason.
+    """
+
+    counts: Mapping[str, int]
+    worst_travel: tuple[WorstPosture, ...]
+    worst_gain: tuple[WorstPosture, ...]
+    travel_percentiles: Mapping[float, float]
+    gain_percentiles: Mapping[float, float]
+    failed: Mapping[str, FailedPosture]
+
+
+@dataclass(frozen=True)
+class MapSummary:
+    """A map in a few numbers.
+
+    Attributes:
+        path: of the store.
+        robot: its name.
+        coordinates: what was mapped over.
+        units: of these.
+        postures: in all.
+        chunks: in all.
+        chunks_done: evaluated so far; the numbers are of these.
+        criteria: by name.
+    """
+
+    path: str
+    robot: str
+    coordinates: tuple[str, ...]
+    units: tuple[str, ...]
+    postures: int
+    chunks: int
+    chunks_done: int
+    criteria: Mapping[str, CriterionSummary]
+
+    @property
+    def complete(self) -> bool:
+        """Whether every chunk is done."""
+        return self.chunks_done == self.chunks
+
+
+def summarise(store: MapStore, progress: Callable[[int], object] | None = None) -> MapSummary:
+    """Fold the parts of the chunks that are done, and read their quantities twice.
+
+    Args:
+        store: the map.
+        progress: called with the number of postures read since; each is read twice.
+    """
+    report = progress or (lambda _: None)
+    total: Part | None = None
+    first: dict[tuple[int, int], int] = {}  # chunk with the first posture of a status
+    shares = Percentiles(len(QUANTITIES) * len(store.criteria), LEVELS)
+    runs = list(store.runs())
+    for start, end in runs:
+        parts = store.parts(start, end)
+        for i, part in enumerate(parts, start):
+            for j, code in np.argwhere(part.counts > 0):
+                first.setdefault((int(j), int(code)), i)
+        total = fold(parts if total is None else [total, *parts])
+        report(_rows(store, start, end, shares.count))
+    for start, end in runs:
+        report(_rows(store, start, end, shares.refine))
+    levels = shares.found().reshape(len(QUANTITIES), len(store.criteria), len(LEVELS))
+    criteria = {}
+    for j, criterion in enumerate(store.criteria):
+        worst: dict[str, tuple[WorstPosture, ...]] = dict.fromkeys(QUANTITIES, ())
+        counts = np.zeros(len(STATUS), int)
+        if total is not None:
+            counts = total.counts[j]
+            for k, name in enumerate(QUANTITIES):
+                rows = zip(total.worst[k, j], total.values[k, j], strict=True)
+                worst[name] = tuple(
+                    _posture(store, name, j, int(p), float(v)) for p, v in rows if p >= 0
+                )
+        travel, gain = (dict(zip(LEVELS, row.tolist(), strict=True)) for row in levels[:, j])
+        criteria[criterion] = CriterionSummary(
+            dict(zip(STATUS, counts.tolist(), strict=True)),
+            worst["least_com_travel"],
+            worst["largest_com_gain"],
+            travel,
+            gain,
+            {
+                STATUS[code]: _failed(store, chunk, j, code)
+                for (column, code), chunk in sorted(first.items())
+                if column == j and code != EVALUATED
+            },
+        )
+    return MapSummary(
+        str(store.path),
+        str(store.parameters["robot"]["name"]),
+        store.names,
+        tuple(store.units(name) for name in store.coordinates),
+        len(store),
+        len(store.done()),
+        sum(end - start for start, end in runs),
+        criteria,
+    )
+
+
+def _rows(store: MapStore, first: int, end: int, take: Callable[[np.ndarray], object]) -> int:
+    """Hand on the quantities over a run of chunks, a column each of criterion and quantity."""
+    block = store.evaluated(tuple(QUANTITIES), first, end)
+    take(block.reshape(len(block), -1))
+    return len(block)
+
+
+def _posture(
+    store: MapStore, quantity: str, criterion: int, row: int, value: float
+) -> WorstPosture:
+    if quantity != "least_com_travel":
+        return WorstPosture(row, _place(store, row), value)
+    travel = store.read("com_travel", row, row + 1)[0, criterion]
+    contact = int(np.argmin(travel))
+    edge = int(store.read("tipping_edge", row, row + 1)[0, criterion, contact])
+    name = store.contacts[contact] if edge >= 0 else ""
+    return WorstPosture(row, _place(store, row), value, name, edge)
+
+
+def _failed(store: MapStore, chunk: int, criterion: int, code: int) -> FailedPosture:
+    """The first posture of a status in a chunk that has one."""
+    start, stop = store.bounds(chunk)
+    status = store.read("status", start, stop)[:, criterion]
+    row = start + int(np.flatnonzero(status == code)[0])
+    reason = str(store.read("reason", row, row + 1)[0, criterion])
+    return FailedPosture(row, _place(store, row), reason)
+
+
+def _place(store: MapStore, row: int) -> dict[str, float]:
+    return {
+        name: float(store.read(column, row, row + 1)[0])
+        for name, column in zip(store.names, store.coordinates, strict=True)
+    }

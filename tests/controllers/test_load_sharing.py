@@ -1,0 +1,92 @@
+"""Statics and controllers share the same load in the same way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.grounds import off_centre
+from support.loads import CRITERIA, criteria
+
+import copsense
+from copsense.controllers import ShareByCriterion
+from copsense.controllers.limited import ShareWithinLimits
+from copsense.errors import InvalidInputError
+from copsense.limits import Limits
+from copsense.load_problem import LoadProblem
+from copsense.statics import share_load
+
+
+@pytest.fixture(scope="module")
+def posture(lateral_path):
+    return off_centre(lateral_path.stances[10])
+
+
+def load(stance, moved):
+    """The load of a stance, or one with the weight through another point."""
+    own = LoadProblem.of(stance)
+    twist = np.zeros(6) if not moved else np.array([3.0, -2.0, 5.0, 1.0, 2.0, 0.5])
+    return replace(own, base_wrench=own.base_wrench + twist)
+
+
+@pytest.mark.parametrize("moved", [False, True], ids=["at rest", "another load"])
+@pytest.mark.parametrize("name", CRITERIA)
+def test_a_controllers_quick_share_is_the_statics(posture, name, moved):
+    criterion, problem = criteria(posture)[name], load(posture, moved)
+    forces, torques = share_load(posture, criterion, problem)
+    quick = ShareByCriterion(posture, criterion)(problem)
+    weight = posture.robot.weight
+    assert np.abs(quick - forces).max() < 1e-8 * weight
+    np.testing.assert_allclose(torques, problem.torques(forces), rtol=0, atol=1e-12 * weight)
+    assert problem.imbalance(forces) < 1e-12 * weight
+    if not moved:
+        own = copsense.solve_equilibrium(posture, criterion)
+        np.testing.assert_array_equal(own.forces, forces)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [Limits(), Limits(cop_margin=0.02), Limits(friction=0.02, cop_margin=0.01)],
+    ids=["loose", "CoP", "friction"],
+)
+@pytest.mark.parametrize("criterion", [copsense.minimum_wrench(1.0), copsense.minimum_torque()])
+def test_a_controllers_share_within_limits_is_the_statics(posture, criterion, limits):
+    exact = copsense.solve_equilibrium(posture, criterion, limits)
+    quick = ShareWithinLimits(posture, criterion, limits)(LoadProblem.of(posture))
+    assert np.abs(quick - exact.forces).max() < 1e-6 * posture.robot.weight
+
+
+@pytest.mark.parametrize("criterion", [copsense.minimum_wrench(1.0), copsense.minimum_torque()])
+def test_the_same_holds_where_a_torque_is_at_its_limit(posture, criterion):
+    free = np.abs(copsense.solve_equilibrium(posture, criterion).torques)
+    joint = posture.robot.torque_names.index("l_hip_roll")
+    limits = Limits(torque={"l_hip_roll": 0.95 * float(free[joint])})
+    exact = copsense.solve_equilibrium(posture, criterion, limits)
+    assert [limit.name for limit in exact.active] == ["torque of l_hip_roll"]
+    quick = ShareWithinLimits(posture, criterion, limits)(LoadProblem.of(posture))
+    assert np.abs(quick - exact.forces).max() < 1e-6 * posture.robot.weight
+
+
+def test_the_cost_over_the_forces_is_the_criterions(posture):
+    rng, problem = np.random.default_rng(3), LoadProblem.of(posture)
+    for name, criterion in criteria(posture).items():
+        quadratic = criterion.at(posture)
+        H, g = quadratic.over_forces(problem)
+        W = quadratic.torque_weight(problem)
+
+        def cost(f, W=W, quadratic=quadratic):
+            tau = problem.torques(f)
+            return tau @ W @ tau / 2 + f @ (quadratic.wrench @ f / 2 - quadratic.pull)
+
+        a, b = rng.standard_normal((2, len(g))) * 10
+        change = (a @ H @ a - b @ H @ b) / 2 - g @ (a - b)
+        assert change == pytest.approx(cost(a) - cost(b), rel=1e-9, abs=1e-9), name
+        np.testing.assert_allclose(H, H.T, rtol=0, atol=1e-9 * np.abs(H).max())
+
+
+def test_a_weight_that_follows_no_inertia_is_rejected_for_control(posture):
+    problem = LoadProblem.of(posture)
+    massless = np.array(problem.joint_inertia)
+    massless[3] = massless[:, 3] = 0.0
+    share = ShareByCriterion(posture, copsense.weighted_torque("inverse inertia"))
+    with pytest.raises(InvalidInputError, match="every joint to move some mass"):
+        share(replace(problem, joint_inertia=massless))
