@@ -63,7 +63,7 @@ def rollout(
         stop: called before every control period; true ends the run.
 
     Returns:
-        The recording: centre of mass, wrenches (measured and commanded), CoPs, margins, torques and
+        What was recorded. It has the centre of mass, wrenches (measured and commanded), CoPs, margins, torques and
         joints over time, why it ended and which contact tipped first. What was recorded before an
         early end is kept.
 
