@@ -56,7 +56,8 @@ ELSEWHERE = (
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
-    (r"py:.*", r"ArrayLike|Figure|Float|Path|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
+    (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
+    (r"py:.*", r"Figure|Path"),  # imported for type checkers alone
     # Type variables, and a type that only its module's own code sees.
     (r"py:class", r"copsense\.paper\.claims\.claim\.(Subject|Other)"),
     (r"py:class", r"copsense\.content\.(Key|Value)|copsense\.labelled\.R|_Problem"),
