@@ -197,8 +197,8 @@ def test_a_sweep_that_lacks_something_is_refused(reproduction):
 def test_limits_bind_where_the_reference_soles_end_and_the_other_foot_pays():
     within = small_reproduction().within_limits
     found = {(b.criterion, b.value > 0): b for b in within.bindings}
-    assert abs(found["minimum-wrench", True].com_y - 0.0384) < 1e-4
-    assert abs(found["minimum-torque", True].com_y - 0.0459) < 1e-4
+    assert abs(found["minimum-wrench", True].value - 0.0384) < 1e-4
+    assert abs(found["minimum-torque", True].value - 0.0459) < 1e-4
     for binding in found.values():
         held = 1 if binding.value > 0 else 0  # the unloading foot is held at its edge
         assert abs(binding.after[held, 1]) < 0.01 < 1.0 < binding.before[held, 1] + 0.05
