@@ -93,7 +93,7 @@ def load_description(
     language: Language | None = None,
     package_dirs: Iterable[str | Path] = (),
 ) -> Description:
-    """Read a description and check what its parser would pass over in silence.
+    """Read a description and check what its parser would ignore without a word.
 
     Args:
         source: path of the file, or the XML itself.
@@ -101,12 +101,14 @@ def load_description(
         package_dirs: folders that hold the packages of ``package://`` meshes.
 
     Raises:
-        ModelLoadError: the file is missing, or is no sound URDF or MJCF; the message says why.
+        ModelLoadError: the file is missing, or is not a valid URDF or MJCF; the message says why.
     """
     kind = language.upper() if language else "URDF or MJCF"
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     if not isinstance(source, str | Path):
-        raise ModelLoadError(f"{source!r} is no path. Give the path of a {kind} file, or its text.")
+        raise ModelLoadError(
+            f"{source!r} is not a path. Give the path of a {kind} file, or its text."
+        )
     path = None if is_text else Path(source)
     if path is not None and not is_file(path):
         what = f"{path} is a folder" if is_folder(path) else f"no file at {str(source)[:300]!r}"
@@ -135,7 +137,8 @@ def load_description(
     if faults:
         more = f" (and {len(faults) - 5} more)" if len(faults) > 5 else ""
         raise ModelLoadError(
-            f"{name} is no sound {found.upper()}: {'; '.join(faults[:5])}{more}. Correct the file."
+            f"{name} is not a valid {found.upper()}: {'; '.join(faults[:5])}{more}. "
+            "Correct the file."
         )
     altered = found == "mjcf" and _one_joint_a_body(root, path)
     if altered:
@@ -176,7 +179,7 @@ def _one_joint_a_body(root: ET.Element, path: Path | None) -> bool:
 
 
 def _urdf_faults(root: ET.Element) -> Iterator[str]:
-    """What the parser refuses without saying where, or takes for something else."""
+    """What the parser rejects without saying where, or takes for something else."""
     links, joints = root.findall("link"), root.findall("joint")
     names = [link.get("name", "") for link in links]
     if not root.get("name"):

@@ -132,7 +132,7 @@ class EngineMismatchError(CopsenseError):
 
 
 class ControllerError(CopsenseError):
-    """A controller raised, or returned something that is no vector of torques."""
+    """A controller raised, or returned something that is not a vector of torques."""
 
 
 class SchedulerError(CopsenseError):
@@ -143,7 +143,7 @@ class InfeasibleError(CopsenseError):
     """No contact wrench respects the limits.
 
     Attributes:
-        violation: the least amount by which every limit would have to give way [N, Nm].
+        violation: the least amount by which every limit would have to be relaxed [N, Nm].
         demands: the limits that demand it.
     """
 
@@ -151,7 +151,7 @@ class InfeasibleError(CopsenseError):
         """Compose the message from the violation and who demands it."""
         self.violation, self.demands = violation, demands
         super().__init__(
-            f"no wrench balances the robot within the limits: each would have to give way by "
+            f"no wrench balances the robot within the limits: each would have to be relaxed by "
             f"{violation:.3g} N, or as many Nm where it limits a moment. In conflict: "
             f"{'; '.join(demands) or 'unknown'}. Relax one of these limits, or move the posture."
         )

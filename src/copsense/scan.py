@@ -290,7 +290,7 @@ class PathScan:
         track = Track(evaluate if exact and self.path.continuous else None)
         before = 0.0
         for value in self._outwards(side):
-            travel = side * (value - self.start)
+            travel = self._travel(value, side)
             values, rates = measure(self.at(value))
             track.add(travel, values, side * rates)
             found = track.first_zero(after=before, tolerance=_PRECISION)
@@ -325,7 +325,7 @@ class PathScan:
                 point = self.at(value)
             except CopsenseError:
                 break  # no posture, or no wrenches, further on
-            reach = side * (value - self.start)
+            reach = self._travel(value, side)
             track.add(reach, *measure(point))
         slack = table.slack(begin.forces, begin.torques)
         rates = side * table.slack_rates(begin.force_rates, begin.torque_rates)
@@ -377,7 +377,7 @@ class PathScan:
         else:
             found = None
             for value in self._outwards(side):
-                travel = side * (value - self.start)
+                travel = self._travel(value, side)
                 if travel <= before:
                     continue
                 try:
@@ -413,6 +413,10 @@ class PathScan:
         yield self._begin
         beyond = values[side * (values - self._begin) > _SAME]
         yield from (float(value) for value in (beyond if side > 0 else beyond[::-1]))
+
+    def _travel(self, value: float, side: int) -> float:
+        """How far a value is from the start; of the start itself 0, not -0."""
+        return side * (value - self.start) + 0.0
 
     def _crossing(self, found: tuple[float, int], side: int) -> Crossing:
         travel, row = found

@@ -116,7 +116,7 @@ def analyse_limits(
 def _next_changes(
     scan: PathScan, found: CopSensitivity, tangent: Float[np.ndarray, " nv"]
 ) -> dict[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]:
-    """The next change of the active limits to either side; nothing where none can be told."""
+    """The next change of the active limits to either side; nothing where none can be found."""
     try:
         return {
             side: (found.next_active_set_change(way * tangent), scan.next_active_set_change(way))

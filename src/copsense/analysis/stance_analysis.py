@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
 from copsense.cop import total_center_of_pressure
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from copsense.plots.style import Figure
-
-_ROUNDING = 1e-6  # rad or m: a joint this far beyond its limit is at it
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +227,7 @@ def analyse(
         for name, criterion in chosen.items():
             assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
             limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
-    notes = (*_limit_notes(here, within, limited), *sole_notes(here), *_joint_notes(here))
+    notes = (*_limit_notes(here, within, limited), *sole_notes(here), *joint_limit_notes(here))
     return Analysis(here, tangent, found, within, limited, along, notes, check)
 
 
@@ -262,18 +260,4 @@ def _limit_notes(
         "said. Move a little."
         for name, analysis in limited.items()
         if not analysis.next_changes
-    ]
-
-
-def _joint_notes(stance: Stance) -> list[str]:
-    """Which joints are beyond their limits, each in its own unit."""
-    robot = stance.robot
-    return [
-        f"{joint} is {math.degrees(excess):.1f} deg beyond its limit."
-        if unit == "rad"
-        else f"{joint} is {excess * 1e3:.1f} mm beyond its limit."
-        for joint, unit, excess in zip(
-            robot.torque_names, robot.torque_units, stance.joint_limit_excess.tolist(), strict=True
-        )
-        if excess > _ROUNDING
     ]

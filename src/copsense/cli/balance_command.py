@@ -17,7 +17,7 @@ from copsense.cli.controller_options import (
     read_gains,
     read_own_controller,
 )
-from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.criterion_options import one_criterion_options, read_criteria
 from copsense.cli.disturbance_options import (
     REFERENCES,
     disturbance_options,
@@ -42,7 +42,7 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     "  copsense balance icub --controller my_balance:Balance --video icub.mp4"
 )
 @stance_options
-@criterion_options
+@one_criterion_options
 @disturbance_options
 @click.option(
     "--reference",
@@ -75,7 +75,7 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     type=click.Choice(["tip", "fall"]),
     default="fall",
     show_default=True,
-    help="End with the first foot that tips, or go on to a fall.",
+    help="End with the first foot that tips, or run on to a fall.",
 )
 @click.option("--output", type=click.Path(), help="Write the recording: .nc.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
@@ -234,7 +234,7 @@ def _print(summary: dict[str, Any]) -> None:
     through = tip and end["kind"] == "completed"
     click.echo(
         f"{summary['robot']} under {summary['controller']}: {end['reason'].rstrip('.')}, "
-        f"{end['time']:.2f} s{', though a contact gave way' if through else ''}"
+        f"{end['time']:.2f} s{', though a contact tipped, lifted or slipped' if through else ''}"
     )
     click.echo(
         f"  CoM y error {summary['com_error_rms'] * 1e3:.3f} mm rms, "

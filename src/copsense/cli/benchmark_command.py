@@ -79,9 +79,9 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     help="Processes, each with one BLAS thread; default one per core, up to 8.",
 )
 @click.option("--quick", is_flag=True, help="Coarser and faster: one posture, steps twice as wide.")
-@click.option("--output", type=click.Path(), help="Table: .csv. One that is there is gone on with.")
+@click.option("--output", type=click.Path(), help="Table: .csv. An existing one is resumed.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
-@click.option("--force", is_flag=True, help="Start the table anew; overwrite the picture.")
+@click.option("--force", is_flag=True, help="Start the table again; overwrite the picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print ranking and agreement as JSON.")
 def benchmark(
     robots: tuple[str, ...],
@@ -97,7 +97,7 @@ def benchmark(
 
     Every robot, posture and criterion is put through each disturbance. The table has a row per
     score, beside it the static prediction along the exact path and to first order; a run that
-    fails is a row with its reason. Stopped at any time, the same command goes on where it was.
+    fails is a row with its reason. A run that was stopped is resumed by the same command.
     Exit code 1 where a run failed.
     """
     from copsense.comparison import read_plan, run_benchmark
@@ -105,7 +105,7 @@ def benchmark(
     from copsense.files import check_output
 
     require("mujoco", "a benchmark in closed loop")
-    # A table that is gone on with has its picture drawn anew.
+    # A table that is resumed has its picture drawn again.
     redraw = force or (output is not None and Path(output).exists())
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=redraw)
@@ -130,7 +130,7 @@ def benchmark(
         if output is not None and Path(output).exists():
             click.echo(
                 f"\nthe cases that were done are kept in {output}; the same command"
-                f"{' without --force' if force else ''} goes on with the others.",
+                f"{' without --force' if force else ''} runs the others.",
                 err=True,
             )
         raise
@@ -153,7 +153,7 @@ def benchmark(
 
 
 def _check_alone(robots: tuple[str, ...], options: dict[str, Any]) -> None:
-    """Refuse options that a plan file decides."""
+    """Reject options that a plan file decides."""
     context = click.get_current_context()
     given = [
         option.opts[0]
@@ -207,7 +207,7 @@ def _plan(
 
 
 def _check_robots(plan: Sequence[Case]) -> None:
-    """Refuse robots and frames that are not there: a name mistyped is no failed row."""
+    """Reject robots and frames that do not exist: a mistyped name is not a failed row."""
     from copsense.robots import PRESETS, load_robot
 
     asked = ((c.robot.source, (*c.robot.contacts, *(c.robot.soles or ()))) for c in plan)
@@ -287,7 +287,7 @@ def _number_or_word(text: str) -> float | int | str:
 
 @contextmanager
 def _bar() -> Iterator[Any]:
-    """A bar with the time left on standard error, where somebody is there to see it."""
+    """A bar with the time left on standard error, where someone is there to see it."""
     from tqdm import tqdm
 
     shape = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}, {remaining} left"

@@ -2,37 +2,47 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.units import LENGTH
 
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
 
 
 def criterion_options(command: F) -> F:
-    """Which criteria share the load."""
-    options = [
+    """Which criteria share the load: any number of them."""
+    return with_options(_options("Repeatable; default the first two."), command)
+
+
+def one_criterion_options(command: F) -> F:
+    """Which criterion shares the load: one."""
+    return with_options(_options("One; default minimum-torque."), command)
+
+
+def _options(how_many: str) -> list[Callable[[Any], Any]]:
+    return [
         click.option(
             "--criterion",
             "criteria",
             multiple=True,
             metavar="NAME",
             help="How the load is shared: minimum-wrench, minimum-torque, limit-weighted-torque, "
-            "inertia-weighted-torque or minimum-tangential. Repeatable; default the first two.",
+            f"inertia-weighted-torque or minimum-tangential. {how_many}",
         ),
         click.option(
             "--characteristic-length",
-            type=float,
+            type=LENGTH,
             default=1.0,
             show_default=True,
-            metavar="M",
+            metavar="LENGTH",
             help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
         ),
     ]
-    return with_options(options, command)
 
 
 def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:

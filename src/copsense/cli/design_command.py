@@ -48,7 +48,11 @@ _SAME = 1e-6  # relative: less is not a gain
     help="The path: world y of the CoM [m], its middle being where the travel begins.",
 )
 @click.option(
-    "--grid", type=click.IntRange(min=2), default=7, show_default=True, help="Values a parameter."
+    "--grid",
+    type=click.IntRange(min=2),
+    default=7,
+    show_default=True,
+    help="Values of each parameter.",
 )
 @click.option(
     "--plot",
@@ -141,8 +145,8 @@ def _print(robot: str, found: Design) -> None:
     )
     if NO_LIMIT in (found.score.first_limit, *(s.first_limit for s in found.baselines)):
         click.echo(
-            "note: the path ends before a limit is met, so that travels of its length are not told "
-            "apart. Sweep farther: --com-y START:STOP:COUNT.",
+            "note: the path ends before a limit is met, so travels of its length cannot be "
+            "compared. Sweep farther: --com-y START:STOP:COUNT.",
             err=True,
         )
     click.echo("\nPareto set (no other is better in both):")

@@ -59,16 +59,32 @@ def disturbance_options(command: F) -> F:
             help="Motors give no more: a number for all, model, or JOINT=NM. Repeatable.",
         ),
         click.option(
-            "--position-noise", type=float, default=0.0, metavar="RAD", help="Of the joints."
+            "--position-noise",
+            type=float,
+            default=0.0,
+            metavar="RAD",
+            help="Noise of the joint positions.",
         ),
         click.option(
-            "--velocity-noise", type=float, default=0.0, metavar="RAD/S", help="Of the joints."
+            "--velocity-noise",
+            type=float,
+            default=0.0,
+            metavar="RAD/S",
+            help="Noise of the joint velocities.",
         ),
         click.option(
-            "--force-noise", type=float, default=0.0, metavar="N", help="Of measured wrenches."
+            "--force-noise",
+            type=float,
+            default=0.0,
+            metavar="N",
+            help="Noise of the measured forces.",
         ),
         click.option(
-            "--moment-noise", type=float, default=0.0, metavar="NM", help="Of measured wrenches."
+            "--moment-noise",
+            type=float,
+            default=0.0,
+            metavar="NM",
+            help="Noise of the measured moments.",
         ),
         click.option(
             "--odometry",
@@ -77,7 +93,7 @@ def disturbance_options(command: F) -> F:
             "that carries most (loaded).",
         ),
         click.option(
-            "--seed", type=int, default=0, show_default=True, help="Of everything random."
+            "--seed", type=int, default=0, show_default=True, help="Seed of everything random."
         ),
     ]
     return with_options(options, command)

@@ -40,8 +40,8 @@ def read_limits(text: str | None) -> Limits | None:
         name, _, value = part.partition("=")
         if name in ("off", "none"):
             raise InvalidInputError(
-                f"--limits {name} is no limit. Leave --limits out for none at all, or switch one "
-                "off by name, such as friction=off."
+                f"--limits {name} is not a limit. Leave --limits out for none at all, or switch "
+                "one off by name, such as friction=off."
             )
         if name not in names:
             raise UnknownNameError("limit", name, names)
@@ -64,5 +64,5 @@ def _limit_value(name: str, value: str) -> float | int | str | None:
         return int(value) if name == "sides" else float(value)
     except ValueError:
         raise InvalidInputError(
-            f"the limit {name}={value!r} is no number. Write, say, {name}=8 or {name}=off."
+            f"the limit {name}={value!r} is not a number. Write, say, {name}=8 or {name}=off."
         ) from None

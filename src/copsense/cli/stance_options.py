@@ -26,8 +26,8 @@ def stance_options(command: F) -> F:
             "contacts",
             multiple=True,
             metavar="FRAME[:KIND]",
-            help="Contact frame; KIND is surface (default) or point. Repeatable; a preset "
-            "has its own.",
+            help="Contact frame; KIND is surface (default), point or planar. Repeatable; a "
+            "preset has its own.",
         ),
         click.option(
             "--contact-at",
@@ -45,7 +45,8 @@ def stance_options(command: F) -> F:
             "--sole-height",
             type=LENGTH,
             metavar="LENGTH",
-            help="Height of the contact plane over the model's frames, along its normal [m].",
+            help="Height of the contact plane over the model's frames, along its normal [m]; "
+            "negative where the sole lies below the frame, such as -0.1077.",
         ),
         click.option(
             "--package-dir",

@@ -18,10 +18,9 @@ from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.path import PosturePath
+    from copsense.robot import Robot
     from copsense.stance import Stance
     from copsense.sweeps import Sweep
-
-_OVER_LIMIT = 1e-6  # rad: less is rounding
 
 
 @click.command(
@@ -96,18 +95,7 @@ def sweep(
         echo_json(summary)
     else:
         _print(summary)
-    model = path.stances[0].robot
-    units = dict(zip(model.torque_names, model.torque_units, strict=True))
-    beyond = dataset["joint_limit_excess"].max("posture")
-    for name in beyond["joint"].values[beyond.values > _OVER_LIMIT]:
-        count = int((dataset["joint_limit_excess"].sel(joint=name) > _OVER_LIMIT).sum())
-        unit = units[str(name)]
-        excess = float(beyond.sel(joint=name)) * (math.degrees(1.0) if unit == "rad" else 1e3)
-        click.echo(
-            f"note: {name} is beyond its limit at {count} postures, by up to {excess:.1f} "
-            f"{'deg' if unit == 'rad' else 'mm'}",
-            err=True,
-        )
+    _note_joints(dataset, path.stances[0].robot)
     for posture, criterion, reason in failures[:5]:
         click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
     if len(failures) > 5:
@@ -158,6 +146,22 @@ def _summary(dataset: Sweep, output: str | None) -> dict[str, Any]:
         "limits": None if limits is None else repr(limits),
         "without_sole": dataset.attrs["without_sole"],
     }
+
+
+def _note_joints(swept: Sweep, robot: Robot) -> None:
+    """Say which joints are beyond their limits on the way."""
+    from copsense.analysis.joint_notes import ROUNDING, distance_text
+
+    units = dict(zip(robot.torque_names, robot.torque_units, strict=True))
+    for name in swept.labels("joint"):
+        excess = swept["joint_limit_excess"].sel(joint=name)
+        count, most = int((excess > ROUNDING).sum()), float(excess.max())
+        if count:
+            click.echo(
+                f"note: {name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up "
+                f"to {distance_text(most, units[name])}",
+                err=True,
+            )
 
 
 def _rounded(value: float) -> float:

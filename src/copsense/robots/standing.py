@@ -88,7 +88,7 @@ def load_stance(
         if preset is None:
             likely = likely_feet(robot)
             raise InvalidInputError(
-                f"robot {robot.name!r} is no preset, so its contacts are not known. Name their "
+                f"robot {robot.name!r} is not a preset, so its contacts are not known. Name their "
                 f"frames, contacts=[...] (--contact FRAME); {'likely ones' if likely else 'all'}: "
                 f"{', '.join(likely or robot.frame_names)}."
             )
@@ -201,7 +201,7 @@ def _contact(given: object, known: Mapping[str, Contact]) -> Contact:
         return known.get(given) or Contact(given)
     if not isinstance(given, Contact):
         raise InvalidInputError(
-            f"{given!r} is no contact. Give a frame's name, or Contact(frame=...)."
+            f"{given!r} is not a contact. Give a frame's name, or Contact(frame=...)."
         )
     return given
 
@@ -211,7 +211,7 @@ def _complete(
 ) -> tuple[Contact, ...]:
     """Fill in offsets and polygons from the collision geometry.
 
-    A contact that the caller placed himself stays where he put it, unless he asks for the sole.
+    A contact that the caller placed stays there, unless the sole is asked for.
     """
     mode = preset.sole_from_geometry if preset else None
     known = {c.frame: c for c in preset.contacts} if preset else {}
