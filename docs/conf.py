@@ -57,7 +57,7 @@ nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
     (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
-    (r"py:class", r"copsense\.paper\.claims\.claim\.Subject"),  # a type variable
+    (r"py:class", r"copsense\.paper\.claims\.claim\.(Subject|Other)"),  # type variables
 ]
 
 
