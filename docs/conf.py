@@ -51,13 +51,16 @@ python_use_unqualified_type_names = True
 # Types that are documented elsewhere: without the network there is nothing to link them to.
 ELSEWHERE = (
     *("coal", "collections", "dataclasses", "fractions", "jaxtyping", "matplotlib", "np", "numpy"),
-    *("pandas", "pathlib", "pin", "pinocchio", "scipy", "typing", "xarray"),
+    *("pandas", "pathlib", "pd", "pin", "pinocchio", "scipy", "typing", "xarray", "xr"),
 )
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
     (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
-    (r"py:class", r"copsense\.paper\.claims\.claim\.(Subject|Other)"),  # type variables
+    (r"py:.*", r"Figure|Path"),  # imported for type checkers alone
+    # Type variables, and a type that only its module's own code sees.
+    (r"py:class", r"copsense\.paper\.claims\.claim\.(Subject|Other)"),
+    (r"py:class", r"copsense\.content\.(Key|Value)|copsense\.labelled\.R|_Problem"),
 ]
 
 

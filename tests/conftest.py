@@ -8,12 +8,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import support.shape_checks  # noqa: F401 -- the hook below finds it by name
 from jaxtyping import install_import_hook
 
-# Every shape that copsense annotates is checked while the suite runs, and only then.
+# Every shape that copsense annotates is checked while the suite runs, and only then; in a closed
+# loop not at every step.
 install_import_hook("copsense", "support.shape_checks.check")
 
 import pytest  # noqa: E402
+from support.sampled_checks import sample_checks  # noqa: E402
 
 import copsense  # noqa: E402
+
+sample_checks()
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 """What the package hands out cannot be changed by accident, and reads well."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -74,3 +76,16 @@ def test_a_ready_model_is_the_way_in(icub):
         copsense.solve_equilibrium(s, copsense.minimum_torque()).wrenches for s in (icub, stance)
     )
     np.testing.assert_allclose(found, given, rtol=0, atol=1e-10)
+
+
+def test_threads_that_share_a_robot_do_not_share_working_memory(icub):
+    path = copsense.lateral_sweep(icub, -0.03, 0.03, 8)
+    configurations = [stance.q for stance in path.stances] * 8
+
+    def gradient(q):
+        return copsense.cop_sensitivity(icub.at(q), copsense.minimum_torque()).gradient
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(gradient, configurations))
+    for q, given in zip(configurations, found, strict=True):
+        np.testing.assert_array_equal(given, gradient(q))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cached_property, update_wrapper
-from typing import Any, TypeVar
+from functools import cached_property
+from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 
@@ -26,11 +25,25 @@ def owned(array: np.ndarray) -> np.ndarray:
 
 
 class array_property(cached_property[Array]):  # noqa: N801 (a decorator, as cached_property)
-    """A property that is computed once and hands out a read-only array."""
+    """A property that is computed once and hands out a read-only array.
 
-    def __init__(self, function: Callable[[Any], Array]) -> None:
-        """Wrap the function that computes it."""
-        super().__init__(update_wrapper(lambda self: read_only(function(self)), function))
+    Two threads that ask first at the same time may both compute it, as in Python 3.12 and later.
+    """
+
+    @overload
+    def __get__(self, instance: None, owner: type[Any] | None = None) -> array_property[Array]: ...
+    @overload
+    def __get__(self, instance: object, owner: type[Any] | None = None) -> Array: ...
+    def __get__(
+        self, instance: object, owner: type[Any] | None = None
+    ) -> array_property[Array] | Array:
+        """The array, kept in the instance, where it is found before this is asked again."""
+        if instance is None:
+            return self
+        assert self.attrname is not None
+        return cast(
+            Array, instance.__dict__.setdefault(self.attrname, read_only(self.func(instance)))
+        )
 
 
 def finite_array(

@@ -233,10 +233,13 @@ class CopSensitivity:
             rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
             speed = np.hypot(rate[:, 0], rate[:, 1])
             moving = speed > _STILL
-            distance = np.full(len(speed), np.inf)
-            np.divide(slack, speed, out=distance, where=moving)
-            # An edge that stands still and is passed already leaves no way back.
-            distance[~moving & (slack < -_ON_EDGE)] = -np.inf
+            if moving.all():
+                distance = slack / speed
+            else:
+                distance = np.full(len(speed), np.inf)
+                np.divide(slack, speed, out=distance, where=moving)
+                # An edge that stands still and is passed already leaves no way back.
+                distance[~moving & (slack < -_ON_EDGE)] = -np.inf
             i = int(distance.argmin())
             if distance[i] < np.inf:
                 travel[k], edge[k] = distance[i], i
@@ -379,6 +382,8 @@ def cop_rates(
     Quotient rule: dp = (d(-m_y, m_x) - p df_z) / f_z.
     """
     trailing = (1,) * (change.ndim - 2)
-    moments = np.stack([-change[:, 4], change[:, 3]], axis=1)
-    normal = equilibrium.wrenches[:, 2].reshape(-1, 1, *trailing)
-    return (moments - cop.reshape(*cop.shape, *trailing) * change[:, None, 2]) / normal
+    rates = cop.reshape(*cop.shape, *trailing) * -change[:, None, 2]
+    rates[:, 0] -= change[:, 4]
+    rates[:, 1] += change[:, 3]
+    rates /= equilibrium.wrenches[:, 2].reshape(-1, 1, *trailing)
+    return rates

@@ -157,7 +157,7 @@ class Stance:
         """For each row of stacked forces, its component 0..5 among (fx, fy, fz, mx, my, mz)."""
         return self._layout.component_index
 
-    @cached_property
+    @array_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
         """Generalised gravity G(q) [N, Nm]: what the torques and contacts must balance."""
         return rigid_body.gravity(self.robot, self.q)
@@ -167,17 +167,17 @@ class Stance:
         """Stacked contact Jacobian J: velocities of the contact frames, in contact axes."""
         return self._stacked(self._local)
 
-    @cached_property
+    @array_property
     def com(self) -> Float[np.ndarray, " 3"]:
         """Centre of mass in the world [m]."""
         return rigid_body.com(self.robot, self.q)
 
-    @cached_property
+    @array_property
     def com_jacobian(self) -> Float[np.ndarray, "3 nv"]:
         """Jacobian of the centre of mass, world axes."""
         return rigid_body.com_jacobian(self.robot, self.q)
 
-    @cached_property
+    @array_property
     def mass_matrix(self) -> Float[np.ndarray, "nv nv"]:
         """Joint-space inertia M(q), symmetric."""
         return rigid_body.mass_matrix(self.robot, self.q)

@@ -335,16 +335,6 @@ def test_a_stop_survives_a_copy():
     assert (str(again), vars(again)) == (str(stop), vars(stop))
 
 
-def test_noise_is_seeded():
-    def run(seed):
-        scenario = Scenario(0.05, noise=Noise(1e-3, 1e-2), seed=seed)
-        return rollout(simulator(), BalancingController(icub(), C2), scenario)
-
-    first, same, other = run(1), run(1), run(2)
-    assert first.equals(same)
-    assert not first["torque"].equals(other["torque"])
-
-
 def test_public_gains_are_softer():
     stiffness, damping = public_gains(icub().robot).per_joint(icub().robot)
     assert stiffness.min() >= 10

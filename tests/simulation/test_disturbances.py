@@ -1,6 +1,7 @@
 """What disturbs a robot: seeded, as it says, and seen by what should see it."""
 
 import typing
+from functools import cache
 
 import numpy as np
 import pinocchio as pin
@@ -8,7 +9,7 @@ import pytest
 from support.standing import C1, C2, Statue, icub, simulator
 
 import copsense
-from copsense.controllers import BalancingController, Sine, load_controller, public_gains
+from copsense.controllers import BalancingController, Hold, Sine, load_controller, public_gains
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
 from copsense.simulation import (
     FootOdometry,
@@ -21,6 +22,12 @@ from copsense.simulation import (
     Scenario,
     rollout,
 )
+
+
+@cache
+def undisturbed(duration, reference=None):
+    """The recording of a run that several tests compare with."""
+    return run(Scenario(duration, reference or Hold(), seed=4))
 
 
 def run(scenario, criterion=C2, engine=None, gains=None):
@@ -36,16 +43,26 @@ EACH = {
     "wrench noise": {"noise": Noise(force=1.0, moment=0.05)},
     "friction": {"friction": (FrictionChange(0.05, 0.1),)},
     "model error": {"model_error": ModelError(0.05, {"root_joint": 1.0})},
-    "odometry": {"odometry": "loaded", "noise": Noise(0.0, 1e-3)},
+    "odometry": {"odometry": "loaded", "noise": Noise(1e-4, 1e-3)},
+    "all noise": {"noise": Noise(1e-4, 1e-2, 1.0, 0.1)},
+    "ground and mass": {
+        "friction": (FrictionChange(0.1, 0.05),),
+        "model_error": ModelError(0.02),
+    },
+    "motors and push": {
+        "motors": Motors(0.005, 40.0, 20.0),
+        "pushes": (Push((0.0, 20.0, 0.0), 0.05),),
+    },
 }
 
 
 @pytest.mark.parametrize("kind", EACH)
 def test_every_disturbance_disturbs_and_is_the_same_twice(kind):
-    plain = {"duration": 0.2, "reference": Sine(0.01, 0.5), "seed": 4}
+    sway = Sine(0.01, 0.5)
+    plain = {"duration": 0.2, "reference": sway, "seed": 4}
     first, again = run(Scenario(**plain, **EACH[kind])), run(Scenario(**plain, **EACH[kind]))
     assert first.equals(again)
-    assert not first.equals(run(Scenario(**plain)))
+    assert not first.equals(undisturbed(0.2, sway))
     if "noise" in EACH[kind]:
         assert not first.equals(run(Scenario(**{**plain, "seed": 5}, **EACH[kind])))
 
@@ -81,7 +98,7 @@ def test_noise_of_the_wrenches_is_seeded_and_of_the_size_asked_for():
     noisy = Scenario(0.5, noise=Noise(force=2.0, moment=0.1), seed=3)
     first, again = run(noisy), run(noisy)
     assert first.equals(again)
-    quiet = run(Scenario(0.5))
+    quiet = undisturbed(0.5)
     off = (first["wrench"] - quiet["wrench"]).values[20:]
     assert off[..., :3].std() == pytest.approx(2.0, rel=0.15)
     assert off[..., 3:].std() == pytest.approx(0.1, rel=0.15)
@@ -94,7 +111,7 @@ def test_noise_of_the_wrenches_is_seeded_and_of_the_size_asked_for():
     [(ModelError(mass=0.05), 1.05 * 33.061673), (ModelError(payload={"l_hand": 1.5}), 34.561673)],
 )
 def test_a_robot_heavier_than_believed_carries_its_true_weight(error, mass):
-    recording = run(Scenario(1.0, model_error=error))
+    recording = run(Scenario(0.6, model_error=error))
     assert recording.attrs["end_kind"] == "completed"
     assert recording.attrs["mass"] == pytest.approx(mass, rel=1e-6)
     total = float(recording["wrench"].isel(time=-1).sel(component="fz").sum())
@@ -104,16 +121,16 @@ def test_a_robot_heavier_than_believed_carries_its_true_weight(error, mass):
 
 
 def test_slippery_ground_lets_a_foot_slip_and_only_from_then_on():
-    push = (Push((60.0, 0.0, 0.0), 0.6, 0.3),)
-    rough = run(Scenario(1.2, pushes=push))
-    smooth = run(Scenario(1.2, pushes=push, friction=(FrictionChange(0.01, 0.5),)))
+    push = (Push((60.0, 0.0, 0.0), 0.2, 0.3),)
+    rough = run(Scenario(0.8, pushes=push))
+    smooth = run(Scenario(0.8, pushes=push, friction=(FrictionChange(0.01, 0.15),)))
     assert smooth.attrs["tip_kind"] == "slip"
-    assert smooth.attrs["tip_time"] > 0.6
+    assert smooth.attrs["tip_time"] > 0.2
     assert rough.attrs["tip_kind"] != "slip"
-    before = {"time": slice(0, 0.49)}
+    before = {"time": slice(0, 0.14)}
     assert smooth["com"].sel(before).equals(rough["com"].sel(before))
     # A rollout leaves the engine's ground as it was.
-    assert run(Scenario(1.2, pushes=push)).equals(rough)
+    assert run(Scenario(0.8, pushes=push)).equals(rough)
 
 
 def test_friction_may_change_under_one_contact():
@@ -291,21 +308,6 @@ def test_a_foot_that_turns_on_the_spot_slips_too():
         if event:  # the farthest corner moves by a chord
             chord = 2 * corner * np.sin(np.radians(degrees) / 2)
             assert f"{chord * 1e3:.1f} mm" in event.message
-
-
-@pytest.mark.parametrize(
-    "scenario",
-    [
-        Scenario(0.2, noise=Noise(1e-4, 1e-2, 1.0, 0.1), seed=5),
-        Scenario(0.2, odometry="loaded", noise=Noise(1e-4), seed=5),
-        Scenario(0.2, friction=(FrictionChange(0.1, 0.05),), model_error=ModelError(0.02)),
-        Scenario(0.2, motors=Motors(0.005, 40.0, 20.0), pushes=(Push((0.0, 20.0, 0.0), 0.05),)),
-    ],
-    ids=["noise", "odometry", "ground and mass", "motors and push"],
-)
-def test_the_same_seed_gives_the_same_numbers(scenario):
-    first, again = run(scenario), run(scenario)
-    assert first.equals(again)
 
 
 def test_what_does_not_fit_is_refused():

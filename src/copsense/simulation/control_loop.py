@@ -63,9 +63,9 @@ def rollout(
         stop: called before every control period; true ends the run.
 
     Returns:
-        The recording: centre of mass, wrenches (measured and commanded), CoPs, margins, torques and
-        joints over time, why it ended and which contact tipped first. What was recorded before an
-        early end is kept.
+        What was recorded. It has the centre of mass, wrenches (measured and commanded), CoPs,
+        margins, torques and joints over time, why the run ended and which contact tipped first.
+        The record up to an early end is kept.
 
     Raises:
         CopsenseError: the scenario does not fit the robot or the simulator.

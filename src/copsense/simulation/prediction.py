@@ -79,7 +79,7 @@ class StaticPrediction:
         """Smallest margin for the coordinate between two values [m].
 
         Returns:
-            On the path, and to first order: by forces that are linear in the coordinate.
+            Both on the path and to first order, by forces that are linear in the coordinate.
         """
         known = ~np.isnan(self.margins)
         y = np.linspace(low, high, 401)

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 # Reciprocal condition number under which the KKT matrix is examined for lost directions.
 _RCOND = 1e-13
+_SOUND = 1e-5  # pivots, relative, from which the matrix is far from losing any
 _ALIKE = 1e-2  # rows whose largest entries differ by less need no scaling
 _NULL = 1e-10  # singular values, relative, that count as lost
 
@@ -44,7 +45,7 @@ class Kkt:
         self.matrix = K = np.zeros((size + len(J), size + len(J)))
         if size > self.nb:
             K[self.nb : size, self.nb : size] = quadratic.compliance(self.problem)
-        K[size:, :size] = J[:, self.on]
+        K[size:, :size] = J if size == J.shape[1] else J[:, self.on]
         K[:size, size:] = K[size:, :size].T
         K[size:, size:] = -quadratic.wrench
         self.free = np.zeros((len(J), 0))
@@ -83,8 +84,9 @@ class Kkt:
         self.scale = scale
         scaled = scale[:, None] * self.matrix * scale
         lu, pivots, info = lapack.dgetrf(scaled)
-        norm = np.abs(scaled).sum(axis=0).max()
-        if info == 0 and lapack.dgecon(lu, norm)[0] > _RCOND:
+        sizes = np.abs(lu.diagonal())
+        sound = info == 0 and sizes.min() > _SOUND * sizes.max()
+        if sound or (info == 0 and lapack.dgecon(lu, _norm(scaled))[0] > _RCOND):
             self.lu, self.pinv = (lu, pivots), None
             return
         # Singular: forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers
@@ -181,6 +183,11 @@ class TieBreak:
         w[nb:] -= W @ at.torques
         change = stance.motion_derivative(w) @ V - first.problem.joint_map.T @ W @ AV[nb:] + H @ df
         return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
+
+
+def _norm(matrix: np.ndarray) -> float:
+    """The matrix's 1-norm."""
+    return float(np.abs(matrix).sum(axis=0).max())
 
 
 def _undetermined(
