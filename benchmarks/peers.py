@@ -403,9 +403,9 @@ def main() -> None:
         *(f"- {name} did not run: {reason}" for name, reason in lost.items()),
         "",
         "iCub on soles of 160 x 72 mm, 1 kHz, ideal motors and sensors. All controllers have the "
-        "same joints, mass and centre of mass (compared at the start), the same targets and the same "
-        "gains on CoM and posture; copsense alone also damps angular momentum. The minimum wrench "
-        "takes moments about the contact frames in metres.",
+        "same joints, mass and centre of mass (compared at the start), the same targets and the "
+        "same gains on CoM and posture; copsense alone also damps angular momentum. The minimum "
+        "wrench takes moments about the contact frames in metres.",
         "",
         "## Slow leans (5 mm/s) to the first tip, no limits",
         "",
@@ -428,9 +428,9 @@ def main() -> None:
             "",
             *within,
             "",
-            "All controllers keep the CoPs 1 mm inside, friction 1; copsense and tsid at least 10 N "
-            "of normal force, placo none. placo's moments are about the soles' centres here, as its "
-            "bounds need.",
+            "All controllers keep the CoPs 1 mm inside, friction 1; copsense and tsid at least "
+            "10 N of normal force, placo none. placo's moments are about the soles' centres here, "
+            "as its bounds need.",
             "",
         ]
     text += [
