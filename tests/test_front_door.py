@@ -14,20 +14,6 @@ import copsense
 
 ROOT = Path(copsense.__file__).parent
 HEAVY = ("numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "numba", "mujoco")
-# Left to rename, when their packages are gone through.
-SHADOWED = {
-    "copsense.maps.marginal",
-    "copsense.maps.skeleton",
-    "copsense.paper.claims.claim",
-    "copsense.paper.report.errata_markdown",
-}
-REPEATED = {
-    "closed_loop.py",
-    "evaluation.py",
-    "gains.py",
-    "prediction.py",
-    "sharing.py",
-}
 
 
 def type_checker_imports():
@@ -85,9 +71,9 @@ def test_no_function_hides_a_module():
         package, _, short = name.rpartition(".")
         if getattr(sys.modules[package], short) is not module:
             hidden.add(name)
-    assert hidden <= SHADOWED
+    assert hidden == set()
 
 
 def test_a_file_name_occurs_once():
     names = Counter(path.name for path in ROOT.rglob("*.py") if path.name != "__init__.py")
-    assert {name for name, times in names.items() if times > 1} <= REPEATED
+    assert {name for name, times in names.items() if times > 1} == set()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -62,8 +63,24 @@ def read_sole(robot: Robot, contact: Contact, *, thickness: float = THICKNESS) -
     return Sole(lowest, outline.vertices)
 
 
+# Meshes are slow to read, and asked for again by notes and warnings. Held as long as the robot, so
+# that a robot loaded after its files have changed is read again.
+_VERTICES: WeakKeyDictionary[Robot, dict[tuple[str, bytes], Float[np.ndarray, "k 3"]]] = (
+    WeakKeyDictionary()
+)
+
+
 def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
     """Vertices of the collision shapes rigidly attached to the contact's frame, contact axes."""
+    known = _VERTICES.setdefault(robot, {})
+    key = contact.frame, contact.rotation.tobytes()
+    if key not in known:
+        known[key] = _read_vertices(robot, contact)
+    return known[key]
+
+
+def _read_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
+    """The same, read from the files."""
     description = robot.description
     if description is None:
         raise InvalidInputError(
@@ -90,11 +107,11 @@ def _foot_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
             f"the collision geometry under frame {contact.frame!r} could not be read: {reason}. "
             "Give package_dirs= (--package-dir) for its meshes, or the contact's polygon."
         ) from None
-    found = [
-        np.array([axes.actInv(shape.placement.act(v)) for v in _shape_vertices(shape, axes)])
-        for shape in shapes.geometryObjects
-        if shape.parentJoint == joint
-    ]
+    found = []
+    for shape in shapes.geometryObjects:
+        if shape.parentJoint == joint:
+            place = axes.actInv(shape.placement)
+            found.append(_shape_vertices(shape, axes) @ place.rotation.T + place.translation)
     if not found:
         raise ModelLoadError(
             f"no collision geometry is attached to frame {contact.frame!r}. Give the contact its "

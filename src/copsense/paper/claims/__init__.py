@@ -4,16 +4,6 @@ To add a claim: put ``@claim(identifier, where, statement)`` over its check in t
 subject, and name it in the table at that module's end.
 """
 
-from copsense.paper.claims.claim import (
-    VERDICT_STANDARD,
-    Claim,
-    EvaluatedClaim,
-    Finding,
-    Verdict,
-    claim,
-    evaluate_claims,
-    judge,
-)
 from copsense.paper.claims.claim_tables import (
     FOUR_BAR_CLAIMS,
     ICUB_CLAIMS,
@@ -28,6 +18,16 @@ from copsense.paper.claims.sway_runs import (
     Stretch,
     Sway,
     stretch,
+)
+from copsense.paper.claims.verdict import (
+    VERDICT_STANDARD,
+    Claim,
+    EvaluatedClaim,
+    Finding,
+    Verdict,
+    claim,
+    evaluate_claims,
+    judge,
 )
 
 __all__ = [

@@ -6,7 +6,6 @@ sweep of postures, and what a simulated robot shows on its recordings.
 
 from __future__ import annotations
 
-from copsense.paper.claims.claim import Claim, EvaluatedClaim, evaluate_claims
 from copsense.paper.claims.closed_loop_claims import SWAY_CLAIMS
 from copsense.paper.claims.cop_claims import COP_CLAIMS
 from copsense.paper.claims.force_claims import FORCE_CLAIMS
@@ -16,6 +15,7 @@ from copsense.paper.claims.icub_sweep import LateralSweep
 from copsense.paper.claims.lemma_claims import LEMMA_CLAIMS
 from copsense.paper.claims.modelling_claims import MODELLING_CLAIMS
 from copsense.paper.claims.sway_runs import Sway
+from copsense.paper.claims.verdict import Claim, EvaluatedClaim, evaluate_claims
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.sweeps import Sweep
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.paper.claims import icub_cop_claims, icub_force_claims
-from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.sway_runs import Stretch, Sway
+from copsense.paper.claims.verdict import Claim, Finding, claim, judge
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, RIGHT
 
 _TRACKED = 1e-4  # m rms: "tracks"

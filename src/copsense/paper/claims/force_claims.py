@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from copsense.paper.claims.claim import Claim, Finding, claim, judge
+from copsense.paper.claims.verdict import Claim, Finding, claim, judge
 from copsense.paper.closed_form.between_feet import (
     LEFT,
     NEARLY,

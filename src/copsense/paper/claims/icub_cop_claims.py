@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.paper.claims import cop_claims, modelling_claims
-from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep
+from copsense.paper.claims.verdict import Claim, Finding, claim, judge
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, PAPER_LENGTH, RIGHT
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.discrepancy import EXACT

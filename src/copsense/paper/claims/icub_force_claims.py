@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.paper.claims import force_claims
-from copsense.paper.claims.claim import Claim, Finding, claim, judge
 from copsense.paper.claims.icub_sweep import SHORT, TORQUE, WRENCH, LateralSweep
+from copsense.paper.claims.verdict import Claim, Finding, claim, judge
 from copsense.paper.closed_form.between_feet import LEFT, NEARLY, RIGHT
 
 _ABOUT = 0.1  # "about", "in general": within a tenth

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from copsense.paper.claims.claim import Claim, Finding, claim, judge
+from copsense.paper.claims.verdict import Claim, Finding, claim, judge
 from copsense.paper.closed_form.dimensions import FourBar
 from copsense.paper.closed_form.discrepancy import (
     EXACT,

@@ -6,7 +6,7 @@ from copsense.extras import require
 
 require("jinja2", "the report")  # before the modules that import it
 
-from copsense.paper.report.errata_markdown import errata_markdown
+from copsense.paper.report.errata_page import errata_markdown
 from copsense.paper.report.page import render_page
 from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.report_folder import check_report_folder, write_report
