@@ -198,25 +198,6 @@ def test_a_posture_out_of_reach_is_a_row_and_exit_code_1(tmp_path):
     assert copsense("plot", path).code == 0
 
 
-def test_a_plot_of_something_else_says_so(tmp_path):
-    path = tmp_path / "notes.nc"
-    path.write_text("not a sweep")
-    assert "no netCDF file" in copsense("plot", path).error
-    assert "no file at" in copsense("plot", tmp_path).error
-    assert [p.name for p in tmp_path.iterdir()] == ["notes.nc"]
-
-
-def test_a_plot_never_writes_over_a_file_unasked(tmp_path):
-    swept, picture = tmp_path / "swept.nc", tmp_path / "swept.png"
-    assert copsense("sweep", "four_bar", "--com-y", "0:0.01:3", "--output", swept).code == 0
-    picture.write_text("old")
-    assert "--force" in copsense("plot", swept).error
-    assert "Choose .png" in copsense("plot", swept, "--output", tmp_path / "swept.txt").error
-    assert picture.read_text() == "old"
-    assert copsense("plot", swept, "--force").code == 0
-    assert picture.read_bytes().startswith(b"\x89PNG")
-
-
 def test_a_picture_of_a_stance_never_replaces_a_file_unasked(tmp_path):
     picture = tmp_path / "stance.png"
     picture.write_text("old")
