@@ -15,7 +15,8 @@ def test_robots_lists_a_robot_that_is_not_installed_with_the_remedy(monkeypatch)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     answer = copsense("robots")
     assert answer.code == 0
-    assert 'pip install "copsense[icub]"' in answer.out
+    assert answer.out.count('pip install "copsense[icub]"') == 1
+    assert "not installed: icub, iCubDarmstadt01" in answer.out
     row = next(r for r in copsense("robots", "--json").json["robots"] if r["name"] == "icub")
     assert row["joints"] == []
     assert "icub-models" in row["missing"]
