@@ -1,4 +1,4 @@
-"""Other people's balancing controllers as referees: writes benchmarks/peers.md.
+"""Balancing controllers of other projects as referees: writes benchmarks/peers.md.
 
     python benchmarks/peers.py [--quick]
 
@@ -60,7 +60,7 @@ BLOCK, ROUNDS = 50, 40  # states that one controller answers in a row; how often
 
 @dataclass(frozen=True)
 class Peer:
-    """Somebody else's controller.
+    """A controller of another project.
 
     Attributes:
         name: also of its environment and its script.
@@ -165,7 +165,7 @@ def describe(stance: copsense.Stance) -> dict[str, Any]:
     contacts = []
     for k, contact in enumerate(stance.contacts):
         if contact.frame not in links or contact.polygon is None:
-            raise ValueError(f"contact {contact.name} is no sole on a link")
+            raise ValueError(f"contact {contact.name} is not a sole on a link")
         corners = np.array(contact.polygon)
         middle = np.append((corners.min(axis=0) + corners.max(axis=0)) / 2, 0.0)
         place = pin.SE3(contact.rotation, np.array(contact.offset))
@@ -402,21 +402,20 @@ def main() -> None:
         *(f"- {name}: {found}" for name, found in versions.items()),
         *(f"- {name} did not run: {reason}" for name, reason in lost.items()),
         "",
-        "iCub on soles of 160 x 72 mm, 1 kHz, ideal motors and sensors. Everybody has the same "
-        "joints, mass and centre of mass (compared at the start), the same targets and the same "
-        "gains on CoM and posture; copsense alone also damps angular momentum. The minimum wrench "
-        "takes moments about the contact frames in metres.",
+        "iCub on soles of 160 x 72 mm, 1 kHz, ideal motors and sensors. All controllers have the "
+        "same joints, mass and centre of mass (compared at the start), the same targets and the "
+        "same gains on CoM and posture; copsense alone also damps angular momentum. The minimum "
+        "wrench takes moments about the contact frames in metres.",
         "",
         "## Slow leans (5 mm/s) to the first tip, no limits",
         "",
         *tips,
         "",
         "tsid's contacts are always unilateral: its soles were made 2 m wide here, so that its "
-        "bounds do not matter. It has no torque cost. Where the CoP reaches an edge is for the law "
-        "that shares the load, how much later the sole has turned by 0.5 degrees for the rest of "
-        "the controller. The real time factor is by processor "
-        "time and includes the physics, the record and, for the peers, their calls and this side "
-        "of the pipe.",
+        "bounds do not matter. It has no torque cost. When a CoP reaches an edge depends on how "
+        "the load is shared, how much later the sole has turned by 0.5 degrees on the rest of the "
+        "controller. The real-time factor uses processor time and includes the physics, the record "
+        "and, for the peers, their calls and this side of the pipe.",
         "",
     ]
     if not quick:
@@ -429,9 +428,9 @@ def main() -> None:
             "",
             *within,
             "",
-            "Everybody keeps the CoPs 1 mm inside, friction 1; copsense and tsid at least 10 N of "
-            "normal force, placo none. placo's moments are about the soles' centres here, as its "
-            "bounds want.",
+            "All controllers keep the CoPs 1 mm inside, friction 1; copsense and tsid at least "
+            "10 N of normal force, placo none. placo's moments are about the soles' centres here, "
+            "as its bounds need.",
             "",
         ]
     text += [
@@ -439,11 +438,11 @@ def main() -> None:
         "",
         *table,
         "",
-        f"From state to torques, in each one's own process, without the pipe, one BLAS thread; "
+        f"From state to torques, each in its own process, without the pipe, one BLAS thread; "
         f"{ROUNDS} rounds in turn of {BLOCK} states of a lean. A call takes state and targets as "
         "arrays and returns torques and wrenches as arrays: for a peer that is handing over its "
         "targets, kinematics, the solver, and reading the results, from Python. A ratio over one "
-        "says that copsense is slower; it is the median over the rounds.",
+        "means that copsense is slower; it is the median over the rounds.",
     ]
     page = Path(__file__).with_suffix(".md")
     page.write_text("\n".join(text) + "\n", encoding="utf-8")

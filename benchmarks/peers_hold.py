@@ -1,6 +1,6 @@
 """A controller that keeps the joints where they are: the pipe's test, and a pattern for others.
 
-Started like a peer, see peers_pipe.py. It can be told to fail in several ways.
+Started like a peer, see peers_pipe.py. It can be set up to fail in several ways.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ _SAME = 1e-9  # relative, of masses and centres of mass
 
 
 class PipeError(Exception):
-    """The other side is not there any more, or said that it cannot go on."""
+    """The other side has ended, or has reported that it cannot continue."""
 
 
 def width(n: int) -> int:
@@ -201,7 +201,7 @@ class PipeController:
             write_frame(self.process.stdin, kind, body)
             answer, body = read_frame(self.process.stdout, self._patience)
         except PipeError as error:
-            # What it said before it ended tells more than that it ended.
+            # Its last message is more useful than the fact that it ended.
             with contextlib.suppress(PipeError):
                 answer, body = read_frame(self.process.stdout, 0.1)
                 if answer == b"E":

@@ -21,7 +21,8 @@ from copsense.limits import Limits
 from copsense.margins import margin_table
 from copsense.path import PosturePath
 from copsense.posture import supporting_joints
-from copsense.scan import PathScan, ScanPoint
+from copsense.scan import PathScan
+from copsense.scan_point import ScanPoint
 from copsense.stance import Stance
 
 Objective = Literal["travel", "gain"]

@@ -9,28 +9,26 @@ give it. Postures are solved outwards from the start and only as far as the ques
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.limits import Limits
-from copsense.margins import LimitMargin, margin_table
+from copsense.margins import margin_table
 from copsense.path import LateralPath, PosturePath
 from copsense.roots import Track
-from copsense.sensitivity import CopSensitivity, cop_rates, cop_sensitivity, sensitivity_of
+from copsense.scan_point import ScanPoint, rates_or_nan
+from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import (
     ActiveSetChange,
     ConstrainedEquilibrium,
-    StaticEquilibrium,
     distance_to_change,
     solve_equilibrium,
 )
+from copsense.travel import Crossing, LimitTravel, Travel
 
 _HERE = 1e-7  # of the coordinate: what changes nearer than this changes here
 _SAME = 1e-9  # of the coordinate: a posture so near to the start is the start
@@ -39,118 +37,7 @@ _CLOSING = 1e-9  # share of a slack, per unit of the coordinate, that is not an 
 _PRECISION = 1e-9  # of a travel
 _CHANGE_PRECISION = 1e-12  # of a change: so near that the limit is only touched
 
-Measure = Callable[["ScanPoint"], tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]]
-
-
-@dataclass(frozen=True, eq=False)
-class ScanPoint:
-    """The equilibrium at one posture of a path, and its derivatives along the path.
-
-    Attributes:
-        value: the path's coordinate.
-        tangent: dq/dcoordinate (nv,).
-        equilibrium: the wrenches and torques there.
-    """
-
-    value: float
-    tangent: Float[np.ndarray, " nv"]
-    equilibrium: StaticEquilibrium
-
-    @property
-    def stance(self) -> Stance:
-        """The posture."""
-        return self.equilibrium.stance
-
-    @property
-    def forces(self) -> Float[np.ndarray, " m"]:
-        """Stacked contact forces, contact axes [N, Nm]."""
-        return self.equilibrium.forces
-
-    @property
-    def torques(self) -> Float[np.ndarray, " n"]:
-        """Joint torques [Nm]."""
-        return self.equilibrium.torques
-
-    @property
-    def force_rates(self) -> Float[np.ndarray, " m"]:
-        """d forces / d coordinate."""
-        return self._derivatives[0][:, 0]
-
-    @property
-    def torque_rates(self) -> Float[np.ndarray, " n"]:
-        """d torques / d coordinate."""
-        return self._derivatives[1][:, 0]
-
-    @property
-    def com_gain(self) -> Float[np.ndarray, "nc 2 2"]:
-        """d cop / d CoM, as `CopSensitivity.com_gain`."""
-        change = self.stance.unstack(self._derivatives[0][:, 1:])
-        return cop_rates(self.equilibrium, contact_cops(self.equilibrium), change)
-
-    @cached_property
-    def sensitivity(self) -> CopSensitivity:
-        """The sensitivity of every contact's centre of pressure there, along every motion."""
-        return sensitivity_of(self.equilibrium)
-
-    @cached_property
-    def _derivatives(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of forces and torques along the path, and along CoM x and y."""
-        directions = np.column_stack([self.tangent, self.stance.com_motions])
-        return self.equilibrium.derivative(directions)
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """Where on its way one of several quantities first falls below zero.
-
-    Attributes:
-        row: which of them.
-        travel: how far from the start, in units of the path's coordinate.
-        value: the coordinate there.
-    """
-
-    row: int
-    travel: float
-    value: float
-
-
-@dataclass(frozen=True)
-class LimitTravel:
-    """How far the path may be followed until one limit is reached.
-
-    Attributes:
-        margin: the margin of the contact or joint to this kind of limit where the path begins.
-        name: the very limit that is met (another edge than the nearest one at the start, say);
-            where none is met within reach, the one predicted.
-        first_order: its travel predicted by the slack and its derivative there [m]; infinite if it
-            moves away, 0 where it is beyond its bound already.
-        exact: its travel found along the path [m]; None if no such limit is met within reach.
-    """
-
-    margin: LimitMargin
-    name: str
-    first_order: float
-    exact: float | None
-
-
-@dataclass(frozen=True)
-class Travel:
-    """What the CoM meets on its way to one side.
-
-    Attributes:
-        direction: +1 towards rising values of the path's coordinate (world +y), or -1.
-        limits: every limit, the nearest by exact travel first.
-        reach: how far the path was followed [m]; less than asked where no posture was found.
-    """
-
-    direction: int
-    limits: tuple[LimitTravel, ...]
-    reach: float
-
-    @property
-    def first(self) -> LimitTravel | None:
-        """The limit met first, or None if none is met within reach."""
-        return self.limits[0] if self.limits and self.limits[0].exact is not None else None
+Measure = Callable[[ScanPoint], tuple[Float[np.ndarray, " r"], Float[np.ndarray, " r"]]]
 
 
 class PathScan:
@@ -295,7 +182,8 @@ class PathScan:
             track.add(travel, values, side * rates)
             found = track.first_zero(after=before, tolerance=_PRECISION)
             if found:
-                return self._crossing(found, side) if found[0] <= reach else None
+                there, row = found
+                return Crossing(row, there, self.start + side * there) if there <= reach else None
             if travel >= reach:
                 return None
             before = travel
@@ -315,7 +203,7 @@ class PathScan:
 
         def measure(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:
             return table.slack(point.forces, point.torques), side * table.slack_rates(
-                *_rates(point)
+                *rates_or_nan(point)
             )
 
         track = Track(lambda travel: measure(self.at(self.start + side * travel)))
@@ -418,10 +306,6 @@ class PathScan:
         """How far a value is from the start; of the start itself 0, not -0."""
         return side * (value - self.start) + 0.0
 
-    def _crossing(self, found: tuple[float, int], side: int) -> Crossing:
-        travel, row = found
-        return Crossing(row, travel, self.start + side * travel)
-
     def _sides(self, value: float, side: int) -> tuple[np.ndarray | None, np.ndarray | None]:
         """dCoP/dcoordinate before and after on the way; None where there is none."""
         try:
@@ -514,11 +398,3 @@ def check_side(side: int) -> int:
             f"the direction is +1 or -1 along the path's coordinate (world y), got {side}."
         )
     return int(side)
-
-
-def _rates(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:
-    """Rates of forces and torques; NaN at a posture where they have no derivative."""
-    try:
-        return point.force_rates, point.torque_rates
-    except CopsenseError:
-        return np.full_like(point.forces, np.nan), np.full_like(point.torques, np.nan)

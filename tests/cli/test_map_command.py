@@ -129,6 +129,13 @@ def test_points_alone_have_no_travel_to_be_the_least(tmp_path):
     assert "inf" not in answer.out
 
 
+def test_the_command_says_that_it_compiles_first(tmp_path, monkeypatch):
+    monkeypatch.setattr("copsense.batch.compiler.is_compiled", lambda _: False)
+    answer = run("map", "icub", "--over", "com_y=0:0.01:2", "--output", tmp_path / "m.zarr")
+    assert answer.code == 0
+    assert "note: the kernel is compiled first" in answer.err
+
+
 def test_without_numba_the_command_says_that_it_will_take_long(tmp_path, monkeypatch):
     find = importlib.util.find_spec
     monkeypatch.setattr(

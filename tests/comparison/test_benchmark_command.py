@@ -1,5 +1,7 @@
 """``copsense benchmark`` answers, writes, goes on and refuses."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -62,6 +64,25 @@ def test_a_plan_is_read(plan):
         read_plan(plan)  # the product has falls of the controller without
     plan.write_text(PLAN.replace('trials = "lean"', 'trials = "delay"'))
     assert read_plan(plan)[0].trial == Breaking("delay", severe=0.04)
+
+
+def test_the_plan_of_the_documentation_is_read(plan):
+    page = Path(__file__).parents[2] / "docs" / "benchmark.md"
+    plan.write_text(page.read_text("utf-8").partition("```toml\n")[2].partition("```")[0])
+    cases = read_plan(plan)
+    assert len(cases) == 2 * 3 + 2
+    assert cases[0].posture.joints == {"l_knee": np.radians(40), "r_knee": np.radians(40)}
+    assert cases[-1].trial == Falls(velocity=0.2, repeats=50)
+
+
+def test_a_posture_has_its_units_in_its_keys(plan):
+    text = PLAN.replace("knees_deg = 0", "knees_deg = 30\njoints_deg = { arm = 90 }")
+    plan.write_text(text + "\n[postures.slid]\njoints_m = { slide = 0.2 }\nwidth = 0.1\n")
+    found = {case.posture.name: case.posture for case in read_plan(plan)}
+    assert found["straight"].knees == pytest.approx(np.pi / 6)
+    assert found["straight"].joints == pytest.approx({"arm": np.pi / 2})
+    assert found["slid"].joints == {"slide": 0.2}
+    assert found["slid"].width == 0.1
 
 
 def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):

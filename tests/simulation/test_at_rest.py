@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.standing import C1, C2, icub, simulator
+from support.standing import C1, C2, icub, second_at_rest, simulator
 
 import copsense
 from copsense.controllers import BalancingController, Sine
@@ -34,7 +34,7 @@ def test_a_tie_break_decides_in_the_controller_too():
 @pytest.mark.parametrize("criterion", [C1, C2], ids=lambda c: c.name)
 def test_the_closed_loop_at_rest_has_the_static_wrenches(criterion):
     stance = icub()
-    recording = rollout(simulator(), BalancingController(stance, criterion), Scenario(1.0))
+    recording = second_at_rest(criterion)
     static = copsense.solve_equilibrium(stance, criterion)
     last = recording.isel(time=-1)
     assert recording.attrs["end_kind"] == "completed"
@@ -75,8 +75,7 @@ def test_light_feet_are_held_from_the_first_step():
 def test_wrenches_are_the_engines_own():
     # The sum over contacts, against Newton: at rest it carries the weight.
     stance = icub()
-    recording = rollout(simulator(), BalancingController(stance, C2), Scenario(0.6))
-    total = recording["wrench"].isel(time=-1).sel(component="fz").sum()
+    total = second_at_rest(C2)["wrench"].isel(time=-1).sel(component="fz").sum()
     assert float(total) == pytest.approx(stance.robot.weight, rel=1e-3)
 
 

@@ -5,7 +5,14 @@ from functools import cache
 import numpy as np
 
 import copsense
-from copsense.simulation import MujocoSimulator, SimulatorStoppedError, Snapshot
+from copsense.controllers import BalancingController
+from copsense.simulation import (
+    MujocoSimulator,
+    Scenario,
+    SimulatorStoppedError,
+    Snapshot,
+    rollout,
+)
 
 C1, C2 = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 # Soles of 160 x 72 mm, as the iCub's simplified model has them, with their inner edges 31 mm from
@@ -36,6 +43,12 @@ def icub(knee=0.0, width=0.14):
 def simulator():
     """One engine for the tests of a process; a rollout resets it."""
     return MujocoSimulator(icub())
+
+
+@cache
+def second_at_rest(criterion):
+    """The recording of a second in which nothing disturbs the iCub."""
+    return rollout(simulator(), BalancingController(icub(), criterion), Scenario(1.0))
 
 
 class Statue:

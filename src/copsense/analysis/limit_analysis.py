@@ -14,9 +14,10 @@ from copsense.errors import CopsenseError
 from copsense.limits import Limits
 from copsense.margins import LimitMargin, limit_margins
 from copsense.path import LateralPath
-from copsense.scan import PathScan, Travel
+from copsense.scan import PathScan
 from copsense.sensitivity import CopSensitivity
 from copsense.statics import ActiveLimit, ActiveSetChange, ConstrainedEquilibrium
+from copsense.travel import Travel
 
 SIDES = {"+y": 1, "-y": -1}  # to which the CoM may go, world axes
 

@@ -43,6 +43,16 @@ def bound(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., None]:
     return found
 
 
+def is_compiled(kernel: Any) -> bool:
+    """Whether a kernel's machine code is in this process or on disk."""
+    if kernel.signatures:
+        return True
+    try:
+        return bool(kernel._cache._cache_file._load_index())
+    except (AttributeError, OSError):  # nowhere to keep it
+        return False
+
+
 def _jit(function: _Function, **more: Any) -> _Function:
     """Compile on first use, keep the machine code on disk, and let other threads run meanwhile."""
     options: dict[str, Any] = {

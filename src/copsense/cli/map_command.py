@@ -129,10 +129,14 @@ def map_command(
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)
     if not Path(output).exists():
-        why = BatchKernel(stance, chosen).fallback_reason
-        slow = f"postures are evaluated one at a time, milliseconds each: {why}" if why else ""
-        for note in filter(None, (slow, height_advice(stance, sampling))):
-            click.echo(f"note: {note}", err=True)
+        kernel = BatchKernel(stance, chosen)
+        if kernel.fallback_reason:
+            _note(
+                f"postures are evaluated one at a time, milliseconds each: {kernel.fallback_reason}"
+            )
+        elif not kernel.compiled:
+            _note("the kernel is compiled first, which takes about a minute, once on a machine")
+        _note(height_advice(stance, sampling))
     done = 0
     with progress_bar(len(sampling), "map") as update:
 
@@ -166,6 +170,11 @@ def map_command(
     else:
         _print(summary, plot)
     click.get_current_context().exit(1 if _failures(summary) else 0)
+
+
+def _note(text: str) -> None:
+    if text:
+        click.echo(f"note: {text}", err=True)
 
 
 def read_axes(stance: Stance, texts: tuple[str, ...]) -> list[Axis]:

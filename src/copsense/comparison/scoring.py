@@ -1,4 +1,4 @@
-"""Scoring: what each trial measures, beside what the statics predict."""
+"""Scoring: what each trial measures, and what the statics predict for it."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push
 _AFTER = 1.0  # s to watch after a push
-_SETTLED = 0.1, 0.2  # s, or share of a run: the ground takes up the weight
-_FASTEST = 0.5  # m/s of the CoM: a push that gives it more tips everything
+_SETTLED = 0.1, 0.2  # s, or share of a run: the contacts settle
+_FASTEST = 0.5  # m/s of the CoM: any larger push tips a contact
 
 
 def score_trial(runner: CaseRunner) -> list[Score]:
     """The scores of a case.
 
     Raises:
-        CopsenseError: it could not be run.
+        CopsenseError: the case could not be run.
     """
     return _score(runner.case.trial, runner)
 
 
 @singledispatch
 def _score(trial: Any, runner: CaseRunner) -> list[Score]:
-    raise TypeError(f"{trial!r} is no trial")
+    raise TypeError(f"{trial!r} is not a trial")
 
 
 @_score.register
@@ -182,7 +182,7 @@ def _falls(trial: Falls, runner: CaseRunner) -> list[Score]:
         ends[str(run.attrs["end_kind"])] += 1
     fell = trial.repeats - ends.pop("completed", 0)
     low, high = map(float, binomtest(fell, trial.repeats).proportion_ci(0.95, "wilson"))
-    # Which has no feet on the ground any more diverges, mostly before its CoM is down.
+    # A robot without contact diverges, mostly before its CoM is down.
     kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(ends.items()))
     reason = f"{fell} of {trial.repeats} fell" + (f": {kinds}" if fell else "")
     return [
@@ -248,7 +248,7 @@ def _extent(trial: Sway) -> tuple[float, float]:
 
 
 def _bracketed(name: str, found: Bracket, what: str, note: str = "") -> Score:
-    """The score of a bisection."""
+    """The score that a bisection gives."""
     low, high = found.ends
     unit, larger = SCORES[name].unit, SCORES[name].larger
     measured = math.isfinite(found.survived) and math.isfinite(found.failed)
@@ -258,7 +258,7 @@ def _bracketed(name: str, found: Bracket, what: str, note: str = "") -> Score:
             name, "measured", (low + high) / 2, low, high,
             runs=found.runs, reason=_and(reason, note),
         )  # fmt: skip
-    # Nothing broke, or everything did: one end is open.
+    # Nothing failed, or everything did: one end is open.
     nothing = math.isfinite(found.survived)
     reason = f"survives even {what}" if nothing else f"does not survive even {what}"
     reason += f" {low:.4g} {unit}"
@@ -268,7 +268,7 @@ def _bracketed(name: str, found: Bracket, what: str, note: str = "") -> Score:
 
 
 def _measured(row: Score, value: float, resolution: float = 0.0) -> Score:
-    """The row with its value, known to a resolution of its own or that of its kind."""
+    """The row with its value and its resolution, at least that of its kind of score."""
     half = max(resolution, SCORES[row.score].resolution)
     return replace(row, status="measured", value=value, low=value - half, high=value + half)
 
@@ -280,7 +280,7 @@ def _impulse(runner: CaseRunner, excursion: float, duration: float) -> float:
 
 
 def _known(value: float) -> float:
-    """A prediction of nothing is no number."""
+    """The value, or NaN if nothing is predicted to happen."""
     return value if math.isfinite(value) else math.nan
 
 

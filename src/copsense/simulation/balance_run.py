@@ -56,8 +56,8 @@ def balance(
         limits: what the controller's wrenches and torques must respect; None for nothing.
         gains: of the built-in controller.
         controller: another controller than `BalancingController`.
-        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` goes on
-            to a fall or the scenario's end.
+        until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` with a
+            fall or the end of the scenario.
         wrenches: measured as the engine's contact forces, or by six-axis sensors over the feet.
         progress: called with the number of control periods done since the last call.
         stop: asked before every control period; true ends the run.

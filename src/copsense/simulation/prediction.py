@@ -18,7 +18,8 @@ from copsense.controllers.target import PathReference, Ramp, Signal, lateral_ref
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.margins import MarginTable, margin_table
-from copsense.scan import PathScan, ScanPoint
+from copsense.scan import PathScan
+from copsense.scan_point import ScanPoint
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
 from copsense.simulation.recording import Recording

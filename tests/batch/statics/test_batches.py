@@ -80,6 +80,15 @@ def test_numbers_may_lie_as_they_like_and_compile_once(case, many, change):
     assert len(evaluate_postures.signatures) == known
 
 
+def test_a_kernel_says_whether_it_is_compiled(case, many, monkeypatch):
+    kernel = BatchKernel(case("icub"), [TORQUE])
+    kernel.evaluate(many[:1])
+    assert kernel.compiled
+    assert BatchKernel(case("icub"), [TORQUE]).compiled  # from disk, or of this process
+    monkeypatch.setattr("copsense.batch.compiler.is_compiled", lambda _: False)
+    assert not BatchKernel(case("icub"), [TORQUE]).compiled
+
+
 def test_results_are_printed_in_one_line(case, many):
     found = evaluate_batch(case("icub"), many[:3], [TORQUE])
     assert repr(found) == (

@@ -86,6 +86,15 @@ class BatchKernel:
             if not len(layout.feet.support):
                 self.fallback_reason = "no joint moves between the contacts"
 
+    @property
+    def compiled(self) -> bool:
+        """Whether the kernel is compiled: if not, the first evaluation takes half a minute more.
+
+        Machine code is kept on disk, so that this happens once on a machine. True where the
+        reference answers everything.
+        """
+        return bool(self.fallback_reason) or self._kernel.compiled
+
     def empty(self, count: int) -> BatchResult:
         """Arrays for the results of `count` postures, to be filled with ``out=``."""
         size = whole_number(count, "the number of postures", least=0)

@@ -24,6 +24,14 @@ class CompiledKernel:
         self._given = (*layout.parts, criteria, self._offset)
         self._code: Callable[..., None] | None = None
 
+    @property
+    def compiled(self) -> bool:
+        """Whether the machine code is in this process or on disk."""
+        from copsense.batch.compiler import is_compiled
+        from copsense.batch.statics.kernel import evaluate_postures
+
+        return self._code is not None or is_compiled(evaluate_postures)
+
     def workspace(self) -> np.ndarray:
         """Memory for one thread."""
         return workspace(self._offset.size)
