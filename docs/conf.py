@@ -59,7 +59,7 @@ nitpick_ignore_regex = [
     (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
     (r"py:.*", r"Figure|Path"),  # imported for type checkers alone
     # Type variables, and a type that only its module's own code sees.
-    (r"py:class", r"copsense\.paper\.claims\.claim\.(Subject|Other)"),
+    (r"py:class", r"copsense\.paper\.claims\.verdict\.(Subject|Other)"),
     (r"py:class", r"copsense\.content\.(Key|Value)|copsense\.labelled\.R|_Problem"),
 ]
 
