@@ -20,7 +20,7 @@ def test_a_plot_takes_limits_the_sweep_knew_nothing_of(tmp_path):
 def test_a_plot_of_something_else_says_so(tmp_path):
     path = tmp_path / "notes.nc"
     path.write_text("not a sweep")
-    assert "no netCDF file" in copsense("plot", path).error
+    assert "is not a netCDF file" in copsense("plot", path).error
     assert "no file at" in copsense("plot", tmp_path).error
     assert [p.name for p in tmp_path.iterdir()] == ["notes.nc"]
 
