@@ -1,4 +1,4 @@
-"""``copsense benchmark`` answers, writes, goes on and refuses."""
+"""``copsense benchmark`` prints, writes, resumes and rejects."""
 
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def test_a_posture_has_its_units_in_its_keys(plan):
     assert found["slid"].width == 0.1
 
 
-def test_a_table_is_printed_written_drawn_and_gone_on_with(plan, tmp_path):
+def test_a_table_is_printed_written_drawn_and_resumed(plan, tmp_path):
     plan.write_text(PLAN.rpartition("[[block]]")[0])
     table, picture = tmp_path / "table.csv", tmp_path / "table.png"
     answer = copsense("benchmark", "--plan", plan, "--output", table, "--plot", picture)

@@ -82,7 +82,7 @@ def test_processes_change_nothing(whole, tmp_path):
     assert sum(shares) == pytest.approx(1.0)
 
 
-def test_a_run_that_was_stopped_goes_on(whole, replayed, tmp_path):
+def test_a_run_that_was_stopped_is_resumed(whole, replayed, tmp_path):
     path, other = whole[0], tmp_path / "stopped.csv"
 
     def stop(share, seen=[0.0]):  # noqa: B006  it is to remember
@@ -108,7 +108,7 @@ def test_a_finished_table_is_not_run_again(whole, monkeypatch):
     assert run_benchmark(plan(), path).equals(table)
 
 
-def test_a_killed_command_is_taken_up_again(whole, replayed, tmp_path):
+def test_a_killed_command_is_resumed(whole, replayed, tmp_path):
     file, table = tmp_path / "plan.toml", tmp_path / "table.csv"
     file.write_text(
         '[robots.narrow]\nsource = "icub"\n'
@@ -141,7 +141,7 @@ def test_a_killed_command_is_taken_up_again(whole, replayed, tmp_path):
     assert table.read_bytes() == whole[0].read_bytes()
 
 
-def test_a_table_of_other_parameters_is_refused(whole, tmp_path):
+def test_a_table_of_other_parameters_is_rejected(whole, tmp_path):
     path, _ = whole
     before = path.read_bytes()
     with pytest.raises(OutputError, match=r"trial\.speed was 0\.02, is now 0\.03"):
@@ -260,7 +260,7 @@ class Tired:
 )
 
 
-def test_a_controller_that_remembers_is_made_anew_for_each_run(tmp_path, monkeypatch):
+def test_a_controller_that_has_memory_is_made_for_each_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "tired_controllers.py").write_text(FORGETFUL)
     # Runs of 200 calls each: a controller of all of them would be tired in the second.
@@ -327,7 +327,7 @@ def test_a_key_is_that_of_the_parameters(monkeypatch):
     assert one(LEAN).key != again.key
 
 
-def test_plans_that_mean_nothing_are_refused(tmp_path):
+def test_plans_that_mean_nothing_are_rejected(tmp_path):
     with pytest.raises(InvalidInputError, match="no case"):
         run_benchmark([])
     with pytest.raises(InvalidInputError, match="twice"):

@@ -45,7 +45,7 @@ def test_a_bound_counts_as_far_as_it_goes_and_a_failure_comes_last():
     assert found == {"a": 1, "b": 3, "c": 1, "d": 4}
 
 
-def test_where_everything_failed_nobody_wins():
+def test_where_everything_failed_no_controller_is_ranked():
     rows = [row(name, np.nan, status="failed", posture="p") for name in "ab"]
     rows += [row(name, np.nan, status="none", posture="q") for name in "ab"]
     assert rank_controllers(pd.DataFrame(rows)).empty

@@ -284,7 +284,7 @@ def test_the_legs_are_between_the_base_and_the_contacts():
         ("delay", {"step": 0}, "step"),
     ],
 )
-def test_trials_that_mean_nothing_are_refused(kind, options, says):
+def test_trials_that_mean_nothing_are_rejected(kind, options, says):
     with pytest.raises(copsense.CopsenseError, match=says):
         trial_named(kind, **options)
 

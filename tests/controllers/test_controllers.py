@@ -16,7 +16,7 @@ def posture(lateral_path):
 
 
 def wrench_controller(stance):
-    """Minimum wrench, written anew: the pseudo-inverse of the balance about the base."""
+    """Minimum wrench, written again: the pseudo-inverse of the balance about the base."""
 
     def controller(q):
         here = stance.at(q)
@@ -26,7 +26,7 @@ def wrench_controller(stance):
 
 
 def torque_controller(stance):
-    """Minimum torque, written anew: least squares over the wrenches' internal directions."""
+    """Minimum torque, written again: least squares over the wrenches' internal directions."""
 
     def controller(q):
         here = stance.at(q)
@@ -94,7 +94,7 @@ def test_a_controllers_own_torques_give_back_its_wrenches(posture):
         np.testing.assert_allclose(law(posture.q), found.wrenches, rtol=0, atol=1e-9)
 
 
-def test_a_law_that_does_not_balance_is_refused(posture):
+def test_a_law_that_does_not_balance_is_rejected(posture):
     with pytest.raises(copsense.CopsenseError, match="do not balance"):
         copsense.cop_sensitivity(posture, lambda q: 0.9 * wrench_controller(posture)(q))
 

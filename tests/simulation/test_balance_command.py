@@ -1,4 +1,4 @@
-"""``copsense balance`` answers, writes and refuses."""
+"""``copsense balance`` prints, writes and rejects."""
 
 import signal
 import subprocess
@@ -230,7 +230,7 @@ def test_gains_from_the_command_can_be_too_much():
         (["--torque-limit", "l_knee"], "JOINT=NM"),
     ],
 )
-def test_gains_and_periods_that_are_none_are_refused(options, says):
+def test_gains_and_periods_that_are_none_are_rejected(options, says):
     answer = copsense("balance", "icub", "--duration", 0.1, *options)
     assert answer.code == 2
     assert says in " ".join(answer.err.split())

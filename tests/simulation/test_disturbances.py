@@ -84,7 +84,7 @@ def test_sensors_over_the_feet_read_the_contacts_wrenches_at_rest():
         assert off[1:].max() > 1e-2
 
 
-def test_sensors_refuse_contacts_they_cannot_tell_apart():
+def test_sensors_reject_contacts_on_one_link():
     stance = icub()
     toe = copsense.Contact("l_sole", "point", name="toe", offset=(0.1, 0.0, -0.0105))
     shared = copsense.Stance(stance.robot, stance.q, [*stance.contacts, toe])
@@ -310,7 +310,7 @@ def test_a_foot_that_turns_on_the_spot_slips_too():
             assert f"{chord * 1e3:.1f} mm" in event.message
 
 
-def test_what_does_not_fit_is_refused():
+def test_what_does_not_fit_is_rejected():
     with pytest.raises(UnknownNameError, match="l_sole"):
         run(Scenario(0.1, friction=(FrictionChange(0.1, 0.0, "left"),)))
     with pytest.raises(UnknownNameError, match="loaded"):

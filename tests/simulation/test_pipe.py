@@ -107,7 +107,7 @@ def test_a_silent_child_is_not_waited_for_without_end():
     ("options", "says"),
     [({"more": ["tail"]}, "tail"), ({"heavier": 1.001}, "mass"), ({"torques": []}, "failed")],
 )
-def test_a_child_with_another_robot_is_refused(piped, options, says):
+def test_a_child_with_another_robot_is_rejected(piped, options, says):
     with pytest.raises(PipeError, match=says):
         piped(**options)
 

@@ -103,6 +103,3 @@ def test_the_report_shows_the_closed_loop(sway, tmp_path):
     assert "copsense balance icub --criterion minimum-wrench --reference sine:0.041:0.1" in page
     recorded = sorted(p.name for p in (tmp_path / "report" / "data").glob("closed_loop_*.nc"))
     assert len(recorded) == 5
-    assert 'id="closed-loop"' not in write_report(
-        small_reproduction(), tmp_path / "static"
-    ).read_text(encoding="utf-8")

@@ -132,6 +132,11 @@ def test_every_claim_is_on_the_page_with_its_verdict(text, reproduction):
         assert ("Condition:" in row) <= (claim.verdict is Verdict.HOLDS_IF)
 
 
+def test_without_a_simulation_the_page_has_no_closed_loop(text, reproduction):
+    assert reproduction.sway is None
+    assert 'id="closed-loop"' not in text
+
+
 def test_the_summary_has_the_numbers(reproduction):
     first, second, third = summary(reproduction)
     assert "0.506 against 0.995" in first

@@ -1,4 +1,4 @@
-"""What the commands answer: JSON that is JSON, the documented names, files that hold everything."""
+"""``copsense sweep`` answers, and writes files that hold everything."""
 
 import csv
 import math
@@ -8,64 +8,7 @@ import pytest
 import xarray as xr
 from support.commands import copsense
 
-
-def numbers(value):
-    if isinstance(value, dict):
-        return [n for v in value.values() for n in numbers(v)]
-    if isinstance(value, list):
-        return [n for v in value for n in numbers(v)]
-    return [value] if isinstance(value, float) else []
-
-
-@pytest.mark.parametrize(
-    "criterion", ["minimum-wrench", "minimum-torque", "weighted-torque", "minimum-tangential"]
-)
-def test_four_bar_answers_in_json(criterion):
-    answer = copsense("four-bar", "--xi", "1.5", "--criterion", criterion, "--json").json
-    assert list(answer["wrenches"]) == list(answer["sensitivity"]) == ["left", "right"]
-    assert list(answer["torques"]) == ["hipL", "ankleL", "hipR", "ankleR"]
-    assert list(answer["cop"]) == ["left", "right"]
-    assert len(answer["com"]) == 2
-    fx, fy, _ = np.sum([answer["wrenches"]["left"], answer["wrenches"]["right"]], axis=0)
-    assert fx == pytest.approx(0.0, abs=1e-9)
-    assert fy == pytest.approx(33 * 9.81)
-
-
-def test_analyse_answers_in_json():
-    answer = copsense("analyse", "icub", "--along", "l_hip_roll", "--check", "--json").json
-    assert list(answer["criteria"]) == ["minimum-wrench", "minimum-torque"]
-    assert answer["checked"] is True
-    row = answer["criteria"]["minimum-torque"]
-    assert len(row["torques"]) == 23
-    assert row["residual"] < 1e-9
-    contact = row["contacts"]["l_sole"]
-    assert len(contact["wrench"]) == 6
-    assert contact["cop_slope"][1] == pytest.approx(0.506, abs=1e-3)
-    assert contact["cop_per_l_hip_roll"][1] == pytest.approx(-0.196, abs=1e-3)
-    assert all(map(math.isfinite, numbers(answer)))
-
-
-def test_json_has_null_for_what_is_infinite():
-    answer = copsense("analyse", "solo12", "--criterion", "minimum-wrench", "--json").json
-    contact = answer["criteria"]["minimum-wrench"]["contacts"]["FL_FOOT"]
-    assert contact["com_travel"] is None  # a point contact never tips
-
-
-def test_robots_answers_in_json_with_every_joint():
-    rows = {row["name"]: row for row in copsense("robots", "--json").json["robots"]}
-    assert len(rows["icub"]["joints"]) == 23
-    assert rows["icub"]["mass"] == pytest.approx(33.06, abs=0.01)
-    assert rows["solo12"]["contacts"][0] == {"frame": "FL_FOOT", "kind": "point"}
-
-
-def test_robots_lists_a_robot_that_is_not_installed_with_the_remedy(monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    answer = copsense("robots")
-    assert answer.code == 0
-    assert 'pip install "copsense[icub]"' in answer.out
-    row = next(r for r in copsense("robots", "--json").json["robots"] if r["name"] == "icub")
-    assert row["joints"] == []
-    assert "icub-models" in row["missing"]
+LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 
 
 @pytest.fixture(scope="module")
@@ -143,3 +86,24 @@ def test_sweep_of_a_joint_and_of_a_table_of_configurations_agree(tmp_path):
     assert answer.code == 0, answer.err
     with xr.open_dataset(again) as dataset:
         np.testing.assert_allclose(dataset["cop"].values, cops, atol=1e-9)
+
+
+def test_a_sweep_within_limits_keeps_every_cop_on_its_sole(tmp_path):
+    file = tmp_path / "within.nc"
+    answer = copsense(
+        "sweep", "icub", "--com-y", "-0.07:0.07:9", "--limits", LIMITS, "--output", file, "--json"
+    )
+    assert answer.code == 0
+    with xr.open_dataset(file) as data:
+        assert float(data["margin"].min()) > -1e-9
+        ends = data["active_limits"].isel(posture=[0, -1]).values
+        assert all("CoP at edge" in name for name in ends.ravel())
+        assert float(data["limit_margin"].min()) > -1e-6
+        assert float(data["limit_margin"].sel(limit="r_sole: cop").isel(posture=-1).max()) < 1e-9
+        assert data["active_limits"].isel(posture=4).values.tolist() == ["", ""]
+
+
+def test_infeasible_limits_are_rows_with_the_limits_in_conflict():
+    answer = copsense("sweep", "icub", "--com-y", "-0.02:0.02:3", "--limits", "normal-force=200")
+    assert answer.code == 1
+    assert "In conflict: l_sole: normal force" in answer.err
