@@ -5,6 +5,7 @@ Jacobians moved to the contact, soles are vertices. Forces *and* torques are var
 statics are nv equality rows, in units of the weight.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import clarabel
@@ -161,7 +162,7 @@ def joint_bounds(stance, torque):
     n = len(stance.robot.torque_names)
     if torque is None:
         return np.full(n, np.inf)
-    if isinstance(torque, dict):
+    if isinstance(torque, Mapping):
         return np.array([torque.get(name, np.inf) for name in stance.robot.torque_names])
     return np.full(n, float(torque))
 
