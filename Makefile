@@ -50,8 +50,12 @@ format: $(DEV_STAMP) ## formatting (checked, nothing is changed)
 	$(BIN)/ruff format --check
 
 .PHONY: types
-types: $(DEV_STAMP) ## type hints
+types: $(DEV_STAMP) ## type hints, and that every public name has one
 	$(BIN)/mypy
+	@# It looks for the packages of the first python on PATH, and lists every module.
+	@report=$$(PATH="$(abspath $(BIN)):$$PATH" $(BIN)/basedpyright --verifytypes copsense \
+	    --ignoreexternal) || { echo "$$report"; exit 1; }; \
+	echo "$$report" | grep 'completeness score'
 
 .PHONY: imports
 imports: $(DEV_STAMP) ## which module may import which

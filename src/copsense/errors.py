@@ -29,7 +29,9 @@ class UnknownNameError(CopsenseError, KeyError):
 
     def __init__(self, kind: str, name: object, valid: Iterable[str], remedy: str = "") -> None:
         """Store the data and compose the message with the nearest valid names."""
-        self.kind, self.name, self.valid = kind, str(name), tuple(valid)
+        self.kind = kind
+        self.name: str = str(name)
+        self.valid: tuple[str, ...] = tuple(valid)
         self.remedy = remedy
         lowered = {choice.lower(): choice for choice in self.valid}
         near = difflib.get_close_matches(self.name.lower(), lowered, n=3, cutoff=0.5)
@@ -40,7 +42,7 @@ class UnknownNameError(CopsenseError, KeyError):
             alike = difflib.get_close_matches(self.name.lower(), lowered, n=_LISTED, cutoff=0.3)
             some = [lowered[n] for n in alike] or list(self.valid[:_LISTED])
             listed = f"{', '.join(some)} ... ({len(self.valid)} in all)"
-        self.message = f"no {kind} named {self.name!r}.{hint} Valid: {listed}." + (
+        self.message: str = f"no {kind} named {self.name!r}.{hint} Valid: {listed}." + (
             f" {remedy}" if remedy else ""
         )
         super().__init__(self.message)
@@ -63,7 +65,9 @@ class MissingExtraError(CopsenseError, ImportError):
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         """Compose the message from the package, the extra that brings it, and why."""
-        self.package, self.extra, self.purpose = package, extra, purpose
+        self.package = package
+        self.extra = extra
+        self.purpose = purpose
         super().__init__(
             f"{purpose} needs the package {package!r}. Install it with: "
             f'pip install "copsense[{extra}]"'
@@ -149,7 +153,8 @@ class InfeasibleError(CopsenseError):
 
     def __init__(self, violation: float, demands: tuple[str, ...]) -> None:
         """Compose the message from the violation and who demands it."""
-        self.violation, self.demands = violation, demands
+        self.violation = violation
+        self.demands = demands
         super().__init__(
             f"no wrench balances the robot within the limits: each would have to be relaxed by "
             f"{violation:.3g} N, or as many Nm where it limits a moment. In conflict: "

@@ -42,7 +42,7 @@ class LabelledResult:
 
     __slots__ = ("_dataset",)
     _dataset: xr.Dataset
-    __hash__ = None  # type: ignore[assignment]
+    __hash__: ClassVar[None]  # type: ignore[assignment]  # as Python sets it beside __eq__
 
     def __init__(self, dataset: xr.Dataset) -> None:
         """Copy the dataset."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from copsense.contact import Contact
 from copsense.limits import LimitRows, Limits, limit_rows
@@ -59,19 +59,19 @@ class MarginTable:
 
     def __init__(self, contacts: Sequence[Contact], rows: LimitRows) -> None:
         """Lay the rows of these contacts, from `limit_rows`, out."""
-        self.contact_rows, fz = rows, _normal_rows(contacts)
-        self.joint, self.sign = rows.joint, rows.sign
-        self.limit = rows.torque[self.joint]
-        self.names = rows.names + rows.torque_names
-        self.kinds = rows.kinds + ("torque",) * len(self.joint)
-        self.where = tuple(contacts[k].name for k in rows.contacts) + tuple(
-            rows.joints[i] for i in self.joint
+        self._contact_rows, fz = rows, _normal_rows(contacts)
+        self._joint, self._sign = rows.joint, rows.sign
+        self._limit = rows.torque[self._joint]
+        self.names: tuple[str, ...] = rows.all_names
+        self.kinds: tuple[str, ...] = rows.all_kinds
+        self.where: tuple[str, ...] = tuple(contacts[k].name for k in rows.contacts) + tuple(
+            rows.joints[i] for i in self._joint
         )
         # Rows of the centres of pressure, and of the normal force under each of them.
         self._cop = np.flatnonzero([kind == "cop" for kind in rows.kinds])
         self._under = fz[np.array(rows.contacts, dtype=int)[self._cop]]
         keys = list(zip(self.where, self.kinds, strict=True))
-        self.groups = [
+        self.groups: list[Int[np.ndarray, " k"]] = [
             np.array([i for i, other in enumerate(keys) if other == key])
             for key in dict.fromkeys(keys)
         ]
@@ -93,15 +93,17 @@ class MarginTable:
         Of a centre of pressure it is f_z (b - a p): affine in the CoM where the wrenches are, and
         negative for at least one edge where the contact pulls.
         """
-        contact = self.contact_rows.bound - forces @ self.contact_rows.matrix.T
-        return np.concatenate([contact, self.limit - self.sign * torques[..., self.joint]], axis=-1)
+        contact = self._contact_rows.bound - forces @ self._contact_rows.matrix.T
+        return np.concatenate(
+            [contact, self._limit - self._sign * torques[..., self._joint]], axis=-1
+        )
 
     def slack_rates(
         self, force_rates: Float[np.ndarray, "*p m"], torque_rates: Float[np.ndarray, "*p n"]
     ) -> Float[np.ndarray, "*p r"]:
         """Derivatives of `slack` along a motion that changes forces and torques at these rates."""
-        contact = -force_rates @ self.contact_rows.matrix.T
-        return np.concatenate([contact, -self.sign * torque_rates[..., self.joint]], axis=-1)
+        contact = -force_rates @ self._contact_rows.matrix.T
+        return np.concatenate([contact, -self._sign * torque_rates[..., self._joint]], axis=-1)
 
     def group_margins(
         self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]

@@ -179,7 +179,8 @@ class LateralPath:
         if samples < 1:
             raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
         self.stance = stance
-        self.values = float(stance.com[1]) + np.linspace(-reach, reach, 2 * samples + 1)
+        steps = np.linspace(-reach, reach, 2 * samples + 1)
+        self.values: Float[np.ndarray, " p"] = float(stance.com[1]) + steps
         self._solver = _Lateral(stance, _held_x(stance), None)
         self._found: dict[float, tuple[Stance, np.ndarray] | str] = {}
 

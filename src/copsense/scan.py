@@ -74,9 +74,11 @@ class PathScan:
                 "a policy q -> wrenches has no exact derivatives to scan a path with. Give a "
                 "Criterion."
             )
-        self.path, self.criterion, self.limits = path, criterion, limits
+        self.path = path
+        self.criterion = criterion
+        self.limits = limits
         values = np.asarray(path.values, dtype=float)
-        self.start = float(values[len(values) // 2] if start is None else start)
+        self.start: float = float(values[len(values) // 2] if start is None else start)
         nearest = float(values[int(np.argmin(np.abs(values - self.start)))])
         near = abs(nearest - self.start) <= _SAME
         # Where a search sets out: the start itself if the path has a posture there.

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
@@ -74,15 +75,15 @@ class SweepRows:
     def __init__(self, stance: Stance, postures: int, criteria: Sequence[str]) -> None:
         """Make every row empty."""
         shape, sizes = (postures, len(criteria)), _sizes(stance)
-        self.criteria = list(criteria)
-        self.values = {
+        self.criteria: list[str] = list(criteria)
+        self.values: dict[str, Float[np.ndarray, "p c ..."]] = {
             name: np.full(shape + tuple(sizes[d] for d in dims), np.nan)
             for name, (dims, _, _) in PER_CRITERION.items()
         }
-        self.side = np.full((*shape, sizes["contact"]), "", dtype=object)
-        self.pulling = np.zeros((*shape, sizes["contact"]), dtype=bool)
-        self.reason = np.full(shape, "", dtype=object)
-        self.active = np.full(shape, "", dtype=object)
+        self.side: np.ndarray = np.full((*shape, sizes["contact"]), "", dtype=object)
+        self.pulling: Bool[np.ndarray, "p c nc"] = np.zeros((*shape, sizes["contact"]), dtype=bool)
+        self.reason: np.ndarray = np.full(shape, "", dtype=object)
+        self.active: np.ndarray = np.full(shape, "", dtype=object)
 
 
 def sweep_dataset(path: PosturePath, rows: SweepRows, attributes: Mapping[str, str]) -> xr.Dataset:

@@ -214,6 +214,6 @@ def _map(name: str) -> Any:
     return intrinsic(function)
 
 
-root = _map("llvm.sqrt")
-floor = _map("llvm.floor")
-magnitude = _map("llvm.fabs")
+root: Any = _map("llvm.sqrt")
+floor: Any = _map("llvm.floor")
+magnitude: Any = _map("llvm.fabs")

@@ -23,7 +23,7 @@ class LazyGroup(click.Group):
     def __init__(self, *args: Any, places: Mapping[str, Place], **options: Any) -> None:
         """Remember where the commands are; the other arguments are those of `click.Group`."""
         super().__init__(*args, **options)
-        self.places = dict(places)
+        self.places: dict[str, Place] = dict(places)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the commands, in the order in which they were given."""

@@ -6,19 +6,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.option_lists import F
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.limits import Limits
 
-limits_option = click.option(
-    "--limits",
-    metavar="NAME=VALUE,...",
-    help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
-    "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
-    "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
-    "friction); off switches one off. Example: friction=0.33,torque=model.",
-)
+
+def limits_option(command: F) -> F:
+    """The option itself, to decorate a command with."""
+    return click.option(
+        "--limits",
+        metavar="NAME=VALUE,...",
+        help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
+        "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
+        "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
+        "friction); off switches one off. Example: friction=0.33,torque=model.",
+    )(command)
 
 
 def read_limits(text: str | None) -> Limits | None:

@@ -17,6 +17,10 @@ from copsense.errors import InvalidInputError
 if TYPE_CHECKING:
     from copsense.robot import Robot
 
+    _ParamType = click.ParamType[Any]
+else:  # not generic in click 8.1
+    _ParamType = click.ParamType
+
 Unit = Literal["rad", "m"]
 
 # SI unit -> how it may be written -> size; the first is what a bare number means.
@@ -112,12 +116,13 @@ def _pairs(texts: Iterable[str], form: str) -> Iterator[tuple[str, str]]:
         yield name, value
 
 
-class Quantity(click.ParamType):  # type: ignore[type-arg]  # not generic in click 8.1
+class Quantity(_ParamType):
     """An option's value as a quantity in SI; a bad one is bad usage."""
 
     def __init__(self, unit: Unit) -> None:
         """Remember what is meant, ``"rad"`` or ``"m"``."""
-        self.unit, self.name = unit, "angle" if unit == "rad" else "length"
+        self.unit: Unit = unit
+        self.name = "angle" if unit == "rad" else "length"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The SI number; a default that is a number already is kept."""

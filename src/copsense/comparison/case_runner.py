@@ -17,7 +17,9 @@ from copsense.controllers import (
     lateral_reference,
     load_controller,
 )
+from copsense.criterion import Criterion
 from copsense.errors import ControllerError, CopsenseError, UnreachablePostureError
+from copsense.limits import Limits
 from copsense.simulation import MujocoSimulator, Push, Recording, Scenario, rollout
 from copsense.simulation.prediction import StaticPrediction, predict
 from copsense.simulation.scenario import LONGEST
@@ -36,8 +38,10 @@ class CaseRunner:
 
     def __init__(self, case: Case, progress: Callable[[float], object] | None = None) -> None:
         """Store the case; everything else is loaded when first used."""
-        self.case, self._progress = case, progress
-        self.criterion, self.limits = case.controller.build_criterion(), case.controller.limits
+        self.case = case
+        self.criterion: Criterion = case.controller.build_criterion()
+        self.limits: Limits | None = case.controller.limits
+        self._progress = progress
 
     @cached_property
     def stance(self) -> Stance:

@@ -64,9 +64,11 @@ class BalancingController:
         name: str | None = None,
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
-        self.stance, self.criterion, self.gains = stance, criterion, gains
+        self.stance = stance
+        self.criterion = criterion
+        self.gains = gains
         self.limits = limits
-        self.name = name or criterion.name
+        self.name: str = name or criterion.name
         if share is None and limits is not None and limits.any:
             share = ShareWithinLimits(stance, criterion, limits)
         self._share = share or ShareByCriterion(stance, criterion)

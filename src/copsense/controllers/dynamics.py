@@ -36,11 +36,12 @@ class StandingDynamics:
                 f"robot {robot.name!r} lives in a plane: a momentum-based controller is spatial. "
                 "Use a robot with a free-floating base."
             )
-        self.model, self.data = robot.model, robot.model.createData()
-        self.mass = robot.mass
+        self.model: pin.Model = robot.model
+        self.data: pin.Data = robot.model.createData()
+        self.mass: float = robot.mass
         # Row-major, so that J' is as LAPACK wants it.
-        self.J = np.zeros((stance.rows[-1].stop, robot.model.nv))
-        self.bias = np.zeros(len(self.J))
+        self.J: Float[np.ndarray, "m nv"] = np.zeros((stance.rows[-1].stop, robot.model.nv))
+        self.bias: Float[np.ndarray, " m"] = np.zeros(len(self.J))
         self._contacts = []
         for contact, world, rows in zip(
             stance.contacts, stance.placements, stance.rows, strict=True
@@ -56,8 +57,11 @@ class StandingDynamics:
         model, data = self.model, self.data
         # One pass for M, h, J, A_G and the accelerations of the links under dv = 0.
         pin.computeAllTerms(model, data, q, v)
-        self.M, self.h, self.angular_map = data.M, data.nle, data.Ag[3:]
-        self.com, self.com_velocity = data.com[0], data.vcom[0]
+        self.M: Float[np.ndarray, "nv nv"] = data.M
+        self.h: Float[np.ndarray, " nv"] = data.nle
+        self.angular_map: Float[np.ndarray, "3 nv"] = data.Ag[3:]
+        self.com: Float[np.ndarray, " 3"] = data.com[0]
+        self.com_velocity: Float[np.ndarray, " 3"] = data.vcom[0]
         for joint, place, axes, rows in self._contacts:
             local = pin.getFrameJacobian(model, data, joint, place, _LOCAL)
             if axes is None:

@@ -34,7 +34,8 @@ class ShareWithinLimits:
 
     def __init__(self, stance: Stance, criterion: Criterion, limits: Limits) -> None:
         """Read the rows once."""
-        self.criterion, self.limits = criterion, limits
+        self.criterion = criterion
+        self.limits = limits
         self._free = ShareByCriterion(stance, criterion)
         self._quadratic = criterion.at(stance)
         self._rows = limit_rows(stance, limits)

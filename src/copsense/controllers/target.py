@@ -189,7 +189,8 @@ class PathReference:
             InvalidInputError: a path of fewer than two postures, or one that does not rise.
             UnreachablePostureError: the signal leaves the part of the path that can be reached.
         """
-        self.path, self.signal = path, signal
+        self.path = path
+        self.signal = signal
         values = np.asarray(path.values, dtype=float)
         if len(values) < 2 or not np.all(np.diff(values) > 0):
             raise InvalidInputError(

@@ -58,8 +58,9 @@ class MapStore:
 
     def __init__(self, path: Path, group: Any) -> None:
         """Wrap an open group; use `open_map` or `create_map`."""
-        self.path, self._group = path, group
-        self.parameters = map_parameters(group.attrs)
+        self.path = path
+        self._group = group
+        self.parameters: dict[str, Any] = map_parameters(group.attrs)
         self.coordinates: tuple[str, ...] = tuple(group.attrs["over"])
         self._arrays = dict(group.arrays())
         self._parts = dict(group["parts"].arrays())

@@ -59,7 +59,8 @@ class MujocoSimulator:
         """Build the model and compare the engines."""
         if wrenches not in ("contacts", "sensors"):
             raise UnknownNameError("source of wrenches", wrenches, ("contacts", "sensors"))
-        self._stance, self.settings = stance, settings or PhysicsSettings()
+        self._stance = stance
+        self.settings: PhysicsSettings = settings or PhysicsSettings()
         self._mujoco = load_mujoco()
         self._source = wrenches
         self._feet = _feet(stance) if wrenches == "sensors" else ()

@@ -53,7 +53,8 @@ class Recorder:
 
     def __init__(self, stance: Stance) -> None:
         """Start an empty record."""
-        self.stance, self._model = stance, stance.robot.model
+        self.stance = stance
+        self._model = stance.robot.model
         self._data = self._model.createData()
         self._rows: dict[str, list[Any]] = {name: [] for name in ("time", *_VARIABLES)}
         self._joints = [(j.idx_q, j.nq == 2) for j in list(self._model.joints)[2:] if j.nv == 1]

@@ -44,7 +44,8 @@ class SimulatorStoppedError(CopsenseError):
 
     def __init__(self, reason: str, time: float) -> None:
         """Store reason and time."""
-        self.reason, self.time = reason, time
+        self.reason = reason
+        self.time = time
         super().__init__(f"{reason}, at {time:.3f} s")
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -14,12 +14,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.linalg import lapack
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.load_problem import LoadProblem
+from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 
 if TYPE_CHECKING:
@@ -37,20 +38,26 @@ class Kkt:
 
     def __init__(self, stance: Stance, criterion: Criterion) -> None:
         """Lay the matrix out and factorise it."""
-        self.stance, self.problem = stance, LoadProblem.of(stance)
-        self.nb, self.quadratic = stance.robot.base_nv, criterion.at(stance)
+        self.stance = stance
+        self.problem: LoadProblem = LoadProblem.of(stance)
+        self.quadratic: Quadratic = criterion.at(stance)
+        self.nb: int = stance.robot.base_nv
         J, quadratic = stance.jacobian, self.quadratic
-        self.on = np.concatenate([np.ones(self.nb, bool), quadratic.active])
-        self.size = size = int(self.on.sum())
-        self.matrix = K = np.zeros((size + len(J), size + len(J)))
+        self.on: Bool[np.ndarray, " nv"] = np.concatenate(
+            [np.ones(self.nb, bool), quadratic.active]
+        )
+        self.size: int = int(self.on.sum())
+        size = self.size
+        self.matrix: Float[np.ndarray, "k k"] = np.zeros((size + len(J), size + len(J)))
+        K = self.matrix
         if size > self.nb:
             K[self.nb : size, self.nb : size] = quadratic.compliance(self.problem)
         K[size:, :size] = J if size == J.shape[1] else J[:, self.on]
         K[:size, size:] = K[size:, :size].T
         K[size:, size:] = -quadratic.wrench
-        self.free = np.zeros((len(J), 0))
+        self.free: Float[np.ndarray, "m z"] = np.zeros((len(J), 0))
         self._factorise()
-        self.tie = None
+        self.tie: TieBreak | None = None
         if self.free.shape[1]:
             if criterion.tie_break is None:
                 raise UndeterminedWrenchError(*_undetermined(stance, criterion, self.free))
@@ -81,13 +88,13 @@ class Kkt:
             if rows.min() > _ALIKE * rows.max():
                 break
             scale /= np.sqrt(np.where(rows > 0, rows, 1.0))
-        self.scale = scale
+        self._scale = scale
         scaled = scale[:, None] * self.matrix * scale
         lu, pivots, info = lapack.dgetrf(scaled)
         sizes = np.abs(lu.diagonal())
         sound = info == 0 and sizes.min() > _SOUND * sizes.max()
         if sound or (info == 0 and lapack.dgecon(lu, _norm(scaled))[0] > _RCOND):
-            self.lu, self.pinv = (lu, pivots), None
+            self._lu, self._pinv = (lu, pivots), None
             return
         # Singular: forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers
         # may be free too (a massless foot), which changes neither forces nor torques.
@@ -95,7 +102,7 @@ class Kkt:
         _, s, vt = np.linalg.svd(seen)
         rank = int(np.sum(s > _NULL * s[0]))
         self.free = vt[rank:].T
-        self.pinv = np.linalg.pinv(scaled, rcond=_NULL, hermitian=True)
+        self._pinv = np.linalg.pinv(scaled, rcond=_NULL, hermitian=True)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Solve, with one step of refinement; a solution of a singular consistent system."""
@@ -103,11 +110,11 @@ class Kkt:
         return x + self._once(right - self.matrix.dot(x))
 
     def _once(self, right: np.ndarray) -> np.ndarray:
-        scale = self.scale if right.ndim == 1 else self.scale[:, None]
+        scale = self._scale if right.ndim == 1 else self._scale[:, None]
         scaled = scale * right
-        if self.pinv is not None:
-            return np.asarray(scale * (self.pinv @ scaled))
-        return np.asarray(scale * lapack.dgetrs(*self.lu, scaled)[0])
+        if self._pinv is not None:
+            return np.asarray(scale * (self._pinv @ scaled))
+        return np.asarray(scale * lapack.dgetrs(*self._lu, scaled)[0])
 
     def derivative(
         self, at: StaticEquilibrium, V: Float[np.ndarray, "nv p"]
@@ -122,7 +129,7 @@ class Kkt:
             right[self.nb : self.size] -= change @ V
         right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
         dx = self.solve(right)
-        if self.pinv is not None:
+        if self._pinv is not None:
             left = np.abs(self.matrix @ dx - right).max()
             if left > 1e-7 * max(1.0, np.abs(right).max()):
                 raise UndeterminedWrenchError(
@@ -151,11 +158,13 @@ class TieBreak:
                 f"criterion {criterion.tie_break.name!r} follows the inertia and cannot be a tie-"
                 "break. Use minimum_wrench, minimum_torque or constant weights."
             )
-        self.first, self.second, self.F = first, second, first.free
-        self.H, _ = second.over_forces(first.problem)
-        self.curvature = self.F.T @ self.H @ self.F
+        self.first = first
+        self.second: Quadratic = second
+        self.F: Float[np.ndarray, "m z"] = first.free
+        H, _ = second.over_forces(first.problem)
+        self.curvature: Float[np.ndarray, "z z"] = self.F.T @ H @ self.F
         lowest = float(np.linalg.eigvalsh(self.curvature)[0])
-        if lowest <= _NULL * float(np.abs(self.H).max()):
+        if lowest <= _NULL * float(np.abs(H).max()):
             raise UndeterminedWrenchError(
                 f"the tie-break {criterion.tie_break.name!r} leaves wrenches undetermined too. "
                 "Use minimum_wrench(characteristic_length), which never does."

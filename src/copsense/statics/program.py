@@ -20,7 +20,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from copsense.errors import CopsenseError, UnsolvedError
 from copsense.statics import qp
@@ -41,9 +41,10 @@ class NoPointError(CopsenseError):
         rows: indices of the rows that demand it.
     """
 
-    def __init__(self, violation: float, rows: np.ndarray) -> None:
+    def __init__(self, violation: float, rows: Int[np.ndarray, " k"]) -> None:
         """Store both."""
-        self.violation, self.rows = violation, rows
+        self.violation = violation
+        self.rows = rows
         super().__init__(f"infeasible by {violation:.3g}")
 
 

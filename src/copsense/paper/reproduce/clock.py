@@ -14,7 +14,8 @@ class Clock:
 
     def __init__(self, progress: Progress | None) -> None:
         """Start with no stage."""
-        self.progress, self.seconds = progress, dict[str, float]()
+        self.progress = progress
+        self.seconds: dict[str, float] = {}
 
     @contextmanager
     def stage(self, name: str, total: int = 1) -> Iterator[Callable[[int], None]]:
