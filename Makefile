@@ -62,7 +62,7 @@ imports: $(DEV_STAMP) ## which module may import which
 	$(BIN)/lint-imports
 
 .PHONY: fix
-fix: $(DEV_STAMP) ## format, and mend what can be mended without thought
+fix: $(DEV_STAMP) ## format, and fix what can be fixed without thought
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
