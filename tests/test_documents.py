@@ -1,5 +1,6 @@
 """Code shown is code run: the examples, the README's and the documentation's snippets."""
 
+import pkgutil
 import re
 import runpy
 import subprocess
@@ -50,6 +51,26 @@ def test_commands_of_the_readme_run(tmp_path):
             text=True,
         )
         assert done.returncode == 0, f"{command}\n{done.stderr}"
+
+
+def new_names():
+    """Dotted names of today in the table of names that changed."""
+    rows = (ROOT / "docs" / "names.md").read_text("utf-8").splitlines()
+    cells = [row.strip("|").split("|") for row in rows if row.startswith("| ")]
+    assert all(len(pair) == 2 for pair in cells)
+    return sorted({name for pair in cells for name in re.findall(r"copsense(?:\.\w+)+", pair[1])})
+
+
+def test_names_that_changed_lead_to_names_of_today():
+    names = new_names()
+    assert len(names) > 100
+    missing = []
+    for name in names:
+        try:
+            pkgutil.resolve_name(name)
+        except (ImportError, AttributeError):
+            missing.append(name)
+    assert not missing
 
 
 def test_citation_gives_the_version():
