@@ -47,7 +47,6 @@ def _lean(trial: Lean, runner: CaseRunner) -> list[Score]:
     expected, note = runner.statics(reference)
     ramp = reference.signal
     run = runner.run(reference, ramp.duration + 0.5)  # type: ignore[attr-defined]
-    end = str(run.attrs["end_kind"])
     tipped = bool(run.attrs["tip_contact"])
     tip = abs(float(run["tip_com"].sel(com_axis="y")) - float(runner.stance.com[1]))
     reason = _and(str(run.attrs["end_reason"]), note)
@@ -55,7 +54,7 @@ def _lean(trial: Lean, runner: CaseRunner) -> list[Score]:
     if tipped:
         step = trial.speed * float(run.attrs["control_period"])
         row = _measured(row, tip, step)
-    elif end == "completed":
+    elif run.completed:
         reason = _and(f"nothing tipped up to {reach * 1e3:.1f} mm", note)
         row = replace(row, status="bound", low=reach, high=math.inf, reason=reason)
     if expected is None:
@@ -78,7 +77,7 @@ def _sway(trial: Sway, runner: CaseRunner) -> list[Score]:
     reason = _and(str(run.attrs["end_reason"]), note)
     rows = {name: Score(name, "failed", reason=reason) for name in trial.scores}
     margin = rows["smallest_margin"]
-    if run.attrs["end_kind"] == "completed":
+    if run.completed:
         late = run.sel(time=slice(min(_SETTLED[0], _SETTLED[1] * trial.seconds), None))
         smallest = late["margin"].min().item()
         if math.isfinite(smallest):
@@ -122,9 +121,9 @@ def _push(trial: PushToTip, runner: CaseRunner) -> list[Score]:
         force = (0.0, sign * impulse / trial.duration, 0.0)
         push = Push(force, start=_START, duration=trial.duration)
         run = runner.run(reference, _START + trial.duration + _AFTER, push=push)
-        if run.attrs["end_kind"] != "completed":
+        if not run.completed:
             tips[impulse] = run
-        return run.attrs["end_kind"] == "completed"
+        return run.completed
 
     found = bisect(survives, 0.0, largest, 2 * trial.resolution)
     row = _bracketed("tip_impulse", found, "a push of", note)
@@ -146,7 +145,7 @@ def _push(trial: PushToTip, runner: CaseRunner) -> list[Score]:
 def _rest(trial: Rest, runner: CaseRunner) -> list[Score]:
     run = runner.run(runner.reference(Hold()), trial.duration)
     reason = str(run.attrs["end_reason"])
-    if run.attrs["end_kind"] != "completed":
+    if not run.completed:
         return failed(trial.scores, reason)
     late = run.sel(time=slice(0.8 * trial.duration, None))
     static = solve_equilibrium(runner.stance, runner.criterion, runner.limits).wrenches
@@ -211,7 +210,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
             changes = {"motors": replace(motors, **{trial.parameter: value})}
         run = runner.run(reference, 1.0 / trial.frequency, **changes)
         runs[value] = run
-        return run.attrs["end_kind"] == "completed"
+        return run.completed
 
     assert trial.mild is not None
     assert trial.severe is not None
