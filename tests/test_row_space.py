@@ -6,8 +6,8 @@ import pytest
 from copsense.row_space import RowSpace
 
 MATRICES = {
-    "far apart": ([[1.0, 0.2, 0.0, 0.5], [0.0, 1.0, 0.3, -0.4]], 2, True),
-    "square": ([[0.5, -1.0], [2.0, 1.0]], 2, True),
+    "far apart": ([[1.0, 0.2, 0.0, 0.5], [0.0, 1.0, 0.3, 0.4]], 2, True),
+    "square": ([[0.5, -1.0], [2.0, 3.0]], 2, True),
     "nearly parallel": ([[1.0, 0.0, 0.0], [1.0, 1e-5, 0.0]], 2, False),
     "dependent": ([[1.0, 2.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0], [1.0, 3.0, 1.0, 1.0]], 2, False),
     "more rows than columns": ([[1.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 2, False),
