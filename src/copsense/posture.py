@@ -145,7 +145,7 @@ def solve_posture(
             hessian = hessian + here.balance_derivative(
                 -multipliers[:contact_rows], -pull / robot.mass
             )
-        K = np.block([[hessian, C.T], [C, np.zeros((len(h), len(h)))]])
+        K = _bordered(hessian, C)
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
             requests = len(axes) + len(columns)
             rate = np.zeros((len(K), requests))
@@ -242,6 +242,16 @@ def _cost_derivatives(
         deviation[3:6] = pin.log3(relative)
         hessian[3:6, 3:6] = weights[3] * pin.Jlog3(relative)
     return weights * deviation, hessian
+
+
+def _bordered(hessian: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """[H C'; C 0]; written out, for `np.block` takes longer than the equations."""
+    n = len(hessian)
+    K = np.zeros((n + len(C), n + len(C)))
+    K[:n, :n] = hessian
+    K[n:, :n] = C
+    K[:n, n:] = C.T
+    return K
 
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
