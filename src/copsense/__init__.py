@@ -27,8 +27,10 @@ if TYPE_CHECKING:
         weighted_torque,
     )
     from copsense.design import design_criterion
+    from copsense.drives import Coupling, Drives, Loop, Spring, Transmission
     from copsense.errors import CopsenseError
     from copsense.limits import Limits
+    from copsense.loads import Load, SpringLoad
     from copsense.maps import load_map, map_postures
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.posture import solve_posture
@@ -46,16 +48,23 @@ __all__ = [
     "Analysis",
     "Contact",
     "CopsenseError",
+    "Coupling",
     "Criterion",
+    "Drives",
     "Limits",
+    "Load",
+    "Loop",
     "PathScan",
     "Plane",
     "PosturePath",
     "Recording",
     "Robot",
+    "Spring",
+    "SpringLoad",
     "Stance",
     "Sweep",
     "TorqueTerm",
+    "Transmission",
     "WrenchTerm",
     "__version__",
     "analyse",
@@ -106,8 +115,19 @@ _HOMES = {
         "weighted_torque",
     ),
     "copsense.design": ("design_criterion",),
+    "copsense.drives": (
+        "Coupling",
+        "Drives",
+        "Loop",
+        "Spring",
+        "Transmission",
+    ),
     "copsense.errors": ("CopsenseError",),
     "copsense.limits": ("Limits",),
+    "copsense.loads": (
+        "Load",
+        "SpringLoad",
+    ),
     "copsense.maps": (
         "load_map",
         "map_postures",
