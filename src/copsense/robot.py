@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 from copsense.arrays import array_property, finite_array, finite_number, read_only
 from copsense.description import Description, load_description, mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.parser_output import caught_parser_output
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
@@ -337,9 +338,11 @@ class Robot:
 
 def build_model(description: Description) -> pin.Model:
     """The Pinocchio model of a description, with a floating base."""
+    said: list[str] = []
     try:
         if description.language == "urdf":
-            return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
+            with caught_parser_output() as said:
+                return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
         with mjcf_file(description) as path:
             model = pin.buildModelFromMJCF(path)
             if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
@@ -349,6 +352,8 @@ def build_model(description: Description) -> pin.Model:
     except (ValueError, RuntimeError, LookupError) as error:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
+        if said:  # the parser's own reason, which its exception does not hold
+            reason = "; ".join(said)
         raise ModelLoadError(
             f"{what} is not a readable {description.language.upper()}: {reason.rstrip('.')}. "
             "Correct the file."

@@ -12,8 +12,10 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact
-from copsense.description import mjcf_file
+from copsense.description import Description, mjcf_file
 from copsense.errors import InvalidInputError, ModelLoadError
+from copsense.meshes import find_mesh
+from copsense.parser_output import caught_parser_output
 from copsense.polygon import Polygon
 from copsense.robot import Robot
 
@@ -141,13 +143,14 @@ def _read_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
     whole = Robot.from_description(description, name=robot.name)
     model, at_frame = whole.model, replace(contact, offset=(0.0, 0.0, 0.0)).on(whole)
     joint, axes = at_frame.joint, at_frame.placement
+    text = ""
+    if description.language == "urdf":
+        links = {f.name for f in model.frames if f.parentJoint == joint}
+        text = _only_collisions_of(description, links)
     try:
         if description.language == "urdf":
-            links = {f.name for f in model.frames if f.parentJoint == joint}
-            text = _only_collisions_of(description.text, links)
-            shapes = pin.buildGeomFromUrdfString(
-                model, text, pin.GeometryType.COLLISION, None, list(description.package_dirs)
-            )
+            with caught_parser_output():  # the reason is in the exception
+                shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
         else:
             with mjcf_file(description) as path:
                 shapes = pin.buildGeomFromMJCF(model, path, pin.GeometryType.COLLISION)
@@ -197,11 +200,18 @@ def _shape_vertices(shape: pin.GeometryObject, axes: pin.SE3) -> Float[np.ndarra
     )
 
 
-def _only_collisions_of(text: str, links: set[str]) -> str:
-    """The URDF without the collision geometry of other links, so that no other mesh is opened."""
-    root = ET.fromstring(text.encode())
+def _only_collisions_of(description: Description, links: set[str]) -> str:
+    """The URDF with the collision geometry of these links alone, its meshes found.
+
+    No other mesh is opened.
+    """
+    root = ET.fromstring(description.text)
     for link in root.iter("link"):
-        if link.get("name") not in links:
-            for collision in link.findall("collision"):
+        for collision in link.findall("collision"):
+            if link.get("name") not in links:
                 link.remove(collision)
+        for mesh in link.iterfind("collision/geometry/mesh"):
+            filename = mesh.get("filename", "")
+            found = find_mesh(filename, description.package_dirs, description.path)
+            mesh.set("filename", str(found))
     return ET.tostring(root, encoding="unicode")
