@@ -40,6 +40,7 @@ class Description:
         package_dirs: folders in which ``package://`` meshes are looked up.
         path: the file the text came from, if any.
         altered: whether the text is no longer the file's (see `_one_joint_a_body`).
+        notes: what the text says and is not used, a sentence each; `Robot.notes` holds them.
     """
 
     text: str = field(repr=False)
@@ -47,6 +48,7 @@ class Description:
     package_dirs: tuple[str, ...] = ()
     path: Path | None = None
     altered: bool = False
+    notes: tuple[str, ...] = ()
 
 
 class mjcf_file:  # noqa: N801 - a context manager, used like a function

@@ -9,6 +9,7 @@ import click
 
 from copsense.cli.limit_options import limits_option
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -88,7 +89,11 @@ def read_stance(
     base_yaw: float | None,
     width: float | None,
 ) -> Stance:
-    """The stance that the options of `stance_options` describe; lengths [m], angles [rad]."""
+    """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
+
+    The robot's notes are printed.
+    """
+    from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
     if sole_height is not None:
@@ -97,15 +102,16 @@ def read_stance(
                 "--sole-height and --contact-at sole both say where the contacts are. Give one."
             )
         contact_at = "frame"  # moved by the height, and no farther
+    chosen = _read_contacts(robot, contacts, sole, sole_height)
     # A preset is passed by name, so that its feet and posture come along.
     source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    if isinstance(source, Robot):
+        echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     # Which unit a bare number has depends on the joint.
-    positions = (
-        read_positions(posture, load_robot(robot, package_dirs=package_dirs)) if posture else {}
-    )
+    positions = read_positions(posture, load_robot(source)) if posture else {}
     return load_stance(
         source,
-        contacts=_read_contacts(robot, contacts, sole, sole_height),
+        contacts=chosen,
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=positions,
