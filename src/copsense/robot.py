@@ -31,6 +31,15 @@ _SLIDING = {
 # Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
 _BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
 
+# Whose frame a name means, where a link, a site and a joint share it.
+_NAMED = (
+    pin.FrameType.BODY,
+    pin.FrameType.OP_FRAME,
+    pin.FrameType.FIXED_JOINT,
+    pin.FrameType.JOINT,
+    pin.FrameType.SENSOR,
+)
+
 # Effort limits from here on are a modeller's "no limit", not a motor's.
 PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 # Positions beyond this are how a parser writes infinity.
@@ -45,11 +54,14 @@ class Robot:
         name: how the robot is called in results.
         model: the Pinocchio model; never changed after construction.
         description: where it came from, or None for a ready model.
+        notes: what its description says and copsense does not use, a sentence each; every command
+            prints them.
     """
 
     name: str
     model: pin.Model
     description: Description | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Reject a model that has no floating base, or whose masses make no sense."""
@@ -144,7 +156,7 @@ class Robot:
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
         model = build_model(description)
-        return cls(name or model.name or "robot", model, description)
+        return cls(name or model.name or "robot", model, description, description.notes)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.
@@ -272,11 +284,30 @@ class Robot:
         # A continuous joint is stored as (cos, sin).
         return float(np.arctan2(here[1], here[0]) if model_joint.nq == 2 else here[0])
 
-    def frame(self, name: str) -> pin.Frame:
-        """A frame of the model, or an error that lists the valid ones."""
-        if name not in self.frame_names:
+    @cached_property
+    def _frame_ids(self) -> dict[str, int]:
+        """Index of each frame by its name, the kinds of `_NAMED` taking the name in their order."""
+        ids: dict[str, int] = {}
+        kinds = [frame.type for frame in self.model.frames]
+        for wanted in _NAMED:
+            for i, (kind, name) in enumerate(zip(kinds, self.frame_names, strict=True)):
+                if kind == wanted:
+                    ids.setdefault(name, i)
+        return ids
+
+    def frame_id(self, name: str) -> int:
+        """Index of a frame in the model, or an error that lists the valid names.
+
+        Descriptions keep the names of links, sites and joints apart, so several frames may share
+        one: the link is meant first, then the site, then the joint.
+        """
+        if name not in self._frame_ids:
             raise UnknownNameError(f"frame in robot {self.name!r}", name, self.frame_names)
-        return self.model.frames[self.model.getFrameId(name)]
+        return self._frame_ids[name]
+
+    def frame(self, name: str) -> pin.Frame:
+        """The frame of the model that `frame_id` finds."""
+        return self.model.frames[self.frame_id(name)]
 
     def configuration(
         self, angles: Mapping[str, float] | None = None, *, base_yaw: float = 0.0

@@ -10,6 +10,7 @@ import click
 
 from copsense.cli.limit_options import limits_option
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -89,7 +90,10 @@ def read_stance(
     base_yaw: float | None,
     width: float | None,
 ) -> Stance:
-    """The stance that the options of `stance_options` describe; lengths [m], angles [rad]."""
+    """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
+
+    The robot's notes are printed.
+    """
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
@@ -101,8 +105,10 @@ def read_stance(
         contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
     source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    if isinstance(source, Robot):
+        echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     named = any(":" in text for text in contacts)
-    model = source if isinstance(source, Robot) else load_robot(robot) if posture or named else None
+    model = load_robot(source) if posture or named else None
     # Which unit a bare number has depends on the joint.
     positions = read_positions(posture, model) if model is not None else {}
     frames = model.frame_names if model is not None else ()

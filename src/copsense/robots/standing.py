@@ -31,14 +31,20 @@ class ContactGeometryWarning(UserWarning):
     """A contact frame is not on the sole that the collision geometry shows."""
 
 
-def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()) -> Robot:
+def load_robot(
+    source: str | Path | Robot | pin.Model, *, package_dirs: Iterable[str | Path] = ()
+) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
+
+    A `Robot` is returned as it is.
 
     Raises:
         UnknownNameError: neither a preset nor a file.
         ModelLoadError: the file cannot be read.
         MissingExtraError: the preset's package is not installed.
     """
+    if isinstance(source, Robot):
+        return source
     if isinstance(source, pin.Model):
         return Robot.from_model(source)
     if str(source) in PRESETS:
@@ -83,7 +89,7 @@ def load_stance(
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
+    robot = load_robot(source, package_dirs=package_dirs)
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
