@@ -27,10 +27,10 @@ if TYPE_CHECKING:
         weighted_torque,
     )
     from copsense.design import design_criterion
-    from copsense.drives import Coupling, Drives, Loop, Spring, Transmission
+    from copsense.drives import Drives
     from copsense.errors import CopsenseError
     from copsense.limits import Limits
-    from copsense.loads import Load, SpringLoad
+    from copsense.loads import Load
     from copsense.maps import load_map, map_postures
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.posture import solve_posture
@@ -48,23 +48,18 @@ __all__ = [
     "Analysis",
     "Contact",
     "CopsenseError",
-    "Coupling",
     "Criterion",
     "Drives",
     "Limits",
     "Load",
-    "Loop",
     "PathScan",
     "Plane",
     "PosturePath",
     "Recording",
     "Robot",
-    "Spring",
-    "SpringLoad",
     "Stance",
     "Sweep",
     "TorqueTerm",
-    "Transmission",
     "WrenchTerm",
     "__version__",
     "analyse",
@@ -115,19 +110,10 @@ _HOMES = {
         "weighted_torque",
     ),
     "copsense.design": ("design_criterion",),
-    "copsense.drives": (
-        "Coupling",
-        "Drives",
-        "Loop",
-        "Spring",
-        "Transmission",
-    ),
+    "copsense.drives": ("Drives",),
     "copsense.errors": ("CopsenseError",),
     "copsense.limits": ("Limits",),
-    "copsense.loads": (
-        "Load",
-        "SpringLoad",
-    ),
+    "copsense.loads": ("Load",),
     "copsense.maps": (
         "load_map",
         "map_postures",

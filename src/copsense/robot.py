@@ -17,6 +17,7 @@ from copsense.arrays import array_property, finite_array, finite_number, read_on
 from copsense.description import Description, load_description, mjcf_file
 from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.parser_output import caught_parser_output
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
@@ -32,6 +33,15 @@ _SLIDING = {
 # Joints whose axes depend on their own position: Pinocchio's derivatives leave that out.
 _BENT = ("Composite", "SphericalZYX", "Universal", "Ellipsoid", "Mimic")
 
+# Whose frame a name means, where a link, a site and a joint share it.
+_NAMED = (
+    pin.FrameType.BODY,
+    pin.FrameType.OP_FRAME,
+    pin.FrameType.FIXED_JOINT,
+    pin.FrameType.JOINT,
+    pin.FrameType.SENSOR,
+)
+
 # Effort limits from here on are a modeller's "no limit", not a motor's.
 PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 # Positions beyond this are how a parser writes infinity.
@@ -46,12 +56,15 @@ class Robot:
         name: how the robot is called in results.
         model: the Pinocchio model; never changed after construction.
         description: where it came from, or None for a ready model.
+        notes: what its description says and copsense does not use, a sentence each; every command
+            prints them.
         drives: which joints have motors, springs and couplings, and the loops among its links.
     """
 
     name: str
     model: pin.Model
     description: Description | None = None
+    notes: tuple[str, ...] = ()
     drives: Drives = field(default_factory=Drives)
 
     def __post_init__(self) -> None:
@@ -210,7 +223,7 @@ class Robot:
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
         model = build_model(description)
-        return cls(name or model.name or "robot", model, description)
+        return cls(name or model.name or "robot", model, description, description.notes)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.
@@ -415,11 +428,30 @@ class Robot:
         # A continuous joint is stored as (cos, sin).
         return float(np.arctan2(here[1], here[0]) if model_joint.nq == 2 else here[0])
 
-    def frame(self, name: str) -> pin.Frame:
-        """A frame of the model, or an error that lists the valid ones."""
-        if name not in self.frame_names:
+    @cached_property
+    def _frame_ids(self) -> dict[str, int]:
+        """Index of each frame by its name, the kinds of `_NAMED` taking the name in their order."""
+        ids: dict[str, int] = {}
+        kinds = [frame.type for frame in self.model.frames]
+        for wanted in _NAMED:
+            for i, (kind, name) in enumerate(zip(kinds, self.frame_names, strict=True)):
+                if kind == wanted:
+                    ids.setdefault(name, i)
+        return ids
+
+    def frame_id(self, name: str) -> int:
+        """Index of a frame in the model, or an error that lists the valid names.
+
+        Descriptions keep the names of links, sites and joints apart, so several frames may share
+        one: the link is meant first, then the site, then the joint.
+        """
+        if name not in self._frame_ids:
             raise UnknownNameError(f"frame in robot {self.name!r}", name, self.frame_names)
-        return self.model.frames[self.model.getFrameId(name)]
+        return self._frame_ids[name]
+
+    def frame(self, name: str) -> pin.Frame:
+        """The frame of the model that `frame_id` finds."""
+        return self.model.frames[self.frame_id(name)]
 
     def configuration(
         self, angles: Mapping[str, float] | None = None, *, base_yaw: float = 0.0
@@ -508,9 +540,11 @@ class JointForce:
 
 def build_model(description: Description) -> pin.Model:
     """The Pinocchio model of a description, with a floating base."""
+    said: list[str] = []
     try:
         if description.language == "urdf":
-            return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
+            with caught_parser_output() as said:
+                return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
         with mjcf_file(description) as path:
             model = pin.buildModelFromMJCF(path)
             if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
@@ -520,6 +554,8 @@ def build_model(description: Description) -> pin.Model:
     except (ValueError, RuntimeError, LookupError) as error:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
+        if said:  # the parser's own reason, which its exception does not hold
+            reason = "; ".join(said)
         raise ModelLoadError(
             f"{what} is not a readable {description.language.upper()}: {reason.rstrip('.')}. "
             "Correct the file."

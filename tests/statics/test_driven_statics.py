@@ -17,7 +17,6 @@ from copsense import (
     Limits,
     Load,
     Robot,
-    SpringLoad,
     TorqueTerm,
     WrenchTerm,
     cop_sensitivity,
@@ -35,6 +34,7 @@ from copsense.errors import (
     UnbalancedError,
     UnknownNameError,
 )
+from copsense.loads import SpringLoad
 from copsense.posture import retract
 from copsense.sensitivity import finite_difference_sensitivity
 from copsense.simulation.mujoco_model import build_model
@@ -355,7 +355,8 @@ except copsense.CopsenseError as error:
     )
     code = f"""
 import copsense
-from copsense import Drives, Load, Loop
+from copsense import Drives, Load
+from copsense.drives import Loop
 stance = copsense.load_stance("icub")
 {calls}"""
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -92,7 +92,7 @@ def sweep(
         dataset.save(output, overwrite=force)
     summary = _summary(dataset, output)
     if as_json:
-        echo_json(summary)
+        echo_json(summary | {"notes": list(path.stances[0].robot.notes)})
     else:
         _print(summary)
     _note_joints(dataset, path.stances[0].robot)
