@@ -44,7 +44,8 @@ class Analysis:
         limit_analyses: criterion's name -> active limits, margins and travels; empty without
             limits.
         along: the joint per which slopes are given too, or None.
-        notes: what to know about the stance: soles, joint limits, placeholders.
+        notes: what to know about robot and stance: what of its file is not used, soles, joint
+            limits, placeholders.
         checked: whether the derivatives were compared with finite differences.
     """
 
@@ -227,7 +228,12 @@ def analyse(
         for name, criterion in chosen.items():
             assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
             limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
-    notes = (*_limit_notes(here, within, limited), *sole_notes(here), *joint_limit_notes(here))
+    notes = (
+        *here.robot.notes,
+        *_limit_notes(here, within, limited),
+        *sole_notes(here),
+        *joint_limit_notes(here),
+    )
     return Analysis(here, tangent, found, within, limited, along, notes, check)
 
 

@@ -9,7 +9,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import PICTURES, echo_json, echo_written
+from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_data, region_lines, save_regions
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import LENGTH, read_positions
@@ -111,8 +111,7 @@ def analyse(
         echo_json(answer)
         return
     click.echo(str(analysis))
-    for note in analysis.notes:
-        click.echo(f"note: {note}", err=True)
+    echo_notes(note for note in analysis.notes if note not in home.robot.notes)  # printed already
     if check:
         click.echo("derivatives agree with finite differences to 1e-7 relative")
     if "regions" in answer:

@@ -169,7 +169,7 @@ def balance(
             write_video(stance, recording, video, overwrite=force, progress=update)
     summary = _summary(recording)
     if as_json:
-        echo_json(summary)
+        echo_json(summary | {"notes": list(stance.robot.notes)})
     else:
         _print(summary)
         echo_written(output, picture, video)

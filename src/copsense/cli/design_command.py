@@ -113,6 +113,7 @@ def design(
                 "baselines": [asdict(s) for s in found.baselines],
                 "alternatives": [asdict(s) for s in found.alternatives],
                 "pareto": [asdict(s) for s in found.pareto],
+                "notes": list(stance.robot.notes),
             }
         )
     else:

@@ -20,7 +20,7 @@ from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, Un
 from copsense.posture import solve_posture
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS, Preset, preset_robot
-from copsense.sole import read_sole
+from copsense.sole import read_sole, tilt_text
 from copsense.stance import Stance
 
 ContactAt = Literal["frame", "sole"]
@@ -31,14 +31,20 @@ class ContactGeometryWarning(UserWarning):
     """A contact frame is not on the sole that the collision geometry shows."""
 
 
-def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()) -> Robot:
+def load_robot(
+    source: str | Path | Robot | pin.Model, *, package_dirs: Iterable[str | Path] = ()
+) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
+
+    A `Robot` is returned as it is.
 
     Raises:
         UnknownNameError: neither a preset nor a file.
         ModelLoadError: the file cannot be read.
         MissingExtraError: the preset's package is not installed.
     """
+    if isinstance(source, Robot):
+        return source
     if isinstance(source, pin.Model):
         return Robot.from_model(source)
     if str(source) in PRESETS:
@@ -83,7 +89,7 @@ def load_stance(
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
+    robot = load_robot(source, package_dirs=package_dirs)
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -242,6 +248,14 @@ def _complete(
             )
             completed.append(contact)
             continue
+        if sole.tilt and contact.polygon is None:
+            warnings.warn(
+                f"contact {contact.name!r} was given the lowest edge alone as its sole, because "
+                f"{tilt_text(contact, sole.tilt)}. Turn the contact by its rotation so that the "
+                "underside lies flat, or give the polygon.",
+                ContactGeometryWarning,
+                stacklevel=3,
+            )
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if lower:
             offset = offset + up * (sole.height - up @ offset)
