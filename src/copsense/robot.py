@@ -13,8 +13,9 @@ import pinocchio as pin
 from jaxtyping import Float, Int
 
 from copsense.arrays import array_property, finite_array, finite_number, read_only
-from copsense.description import Description, load_description, mjcf_file
+from copsense.description import Description, load_description
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.mjcf import MjcfReading, read_mjcf
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
@@ -55,12 +56,14 @@ class Robot:
         description: where it came from, or None for a ready model.
         notes: what its description says and copsense does not use, a sentence each; every command
             prints them.
+        mjcf: what was read from an MJCF, with every joint of the file; None for other robots.
     """
 
     name: str
     model: pin.Model
     description: Description | None = None
     notes: tuple[str, ...] = ()
+    mjcf: MjcfReading | None = None
 
     def __post_init__(self) -> None:
         """Reject a model that has no floating base, or whose masses make no sense."""
@@ -140,10 +143,28 @@ class Robot:
 
     @classmethod
     def from_mjcf(
-        cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
+        cls,
+        source: str | Path,
+        *,
+        name: str | None = None,
+        frames: Iterable[str] = (),
+        root: str | None = None,
     ) -> Robot:
-        """Read an MJCF file or its text, as `from_urdf`; a base without joint gets a free-flyer."""
-        description = load_description(source, "mjcf", package_dirs)
+        """Read an MJCF file or its text, as MuJoCo compiles it; a base that is fixed floats.
+
+        Args:
+            source: path of the file, or the XML itself.
+            name: the robot's name; default the one in the file.
+            frames: frames of the robot that is meant, where the file holds several things.
+            root: name of a body of the robot that is meant.
+
+        Raises:
+            ModelLoadError: the file is missing or not an MJCF, or it takes MuJoCo to read it and
+                MuJoCo is not installed.
+            InvalidInputError: several robots could be meant.
+            UnknownNameError: it has no body named `root`.
+        """
+        description = load_description(source, "mjcf", frames=frames, root=root)
         return cls.from_description(description, name=name)
 
     @classmethod
@@ -154,8 +175,12 @@ class Robot:
     @classmethod
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
-        model = build_model(description)
-        return cls(name or model.name or "robot", model, description, description.notes)
+        if description.language == "urdf":
+            model = _build_urdf(description)
+            return cls(name or model.name or "robot", model, description, description.notes)
+        read = read_mjcf(description)
+        notes = (*description.notes, *read.notes)
+        return cls(name or read.model.name or "robot", read.model, description, notes, read)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.
@@ -366,21 +391,13 @@ class Robot:
         return f"Robot({self.name!r}, {len(self.torque_names)} joints, {self.mass:.4g} kg)"
 
 
-def build_model(description: Description) -> pin.Model:
-    """The Pinocchio model of a description, with a floating base."""
+def _build_urdf(description: Description) -> pin.Model:
+    """The Pinocchio model of a URDF, with a floating base."""
     try:
-        if description.language == "urdf":
-            return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
-        with mjcf_file(description) as path:
-            model = pin.buildModelFromMJCF(path)
-            if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
-                return model
-            base = pin.JointModelFreeFlyer()
-            return pin.buildModelAndLegacyConstraintsFromMJCF(path, base, "root_joint")[0]
+        return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError, LookupError) as error:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
         raise ModelLoadError(
-            f"{what} is not a readable {description.language.upper()}: {reason.rstrip('.')}. "
-            "Correct the file."
+            f"{what} is not a readable URDF: {reason.rstrip('.')}. Correct the file."
         ) from None

@@ -104,7 +104,11 @@ def read_stance(
         contact_at = "frame"  # moved by the height, and no farther
     chosen = _read_contacts(robot, contacts, sole, sole_height)
     # A preset is passed by name, so that its feet and posture come along.
-    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    source = (
+        robot
+        if robot in PRESETS
+        else load_robot(robot, package_dirs=package_dirs, frames=_frames(chosen))
+    )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     # Which unit a bare number has depends on the joint.
@@ -151,6 +155,10 @@ def _read_contacts(
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
         contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
+
+
+def _frames(contacts: list[str | Contact] | None) -> list[str]:
+    return [c if isinstance(c, str) else c.frame for c in contacts or ()]
 
 
 def _raised(contact: Contact, height: float) -> Contact:
