@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib.util
 
 from copsense.description import Description
-from copsense.mjcf.reading import MjcfReading
+from copsense.mjcf.mjcf_reading import MjcfReading
 
 
 def read_mjcf(description: Description) -> MjcfReading:

@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from copsense.mjcf.reading import MjcfShape
+from copsense.mjcf.mjcf_reading import MjcfShape
 from copsense.mjcf.scene import body_label
 from copsense.mjcf.tree_model import Tree, pose
 

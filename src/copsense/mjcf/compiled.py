@@ -12,7 +12,7 @@ from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.mjcf.audit import check_against
 from copsense.mjcf.collision import collision_shapes
 from copsense.mjcf.effort import effort_limits
-from copsense.mjcf.reading import MjcfReading
+from copsense.mjcf.mjcf_reading import MjcfReading
 from copsense.mjcf.scene import find_robot, left_out
 from copsense.mjcf.tree_model import build_tree
 from copsense.mjcf.unused import unused

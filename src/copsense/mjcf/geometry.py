@@ -7,7 +7,7 @@ from typing import Any
 import pinocchio as pin
 
 from copsense.description import Description
-from copsense.mjcf.reading import MjcfReading, MjcfShape
+from copsense.mjcf.mjcf_reading import MjcfReading, MjcfShape
 
 
 def geometry_objects(reading: MjcfReading, description: Description) -> list[pin.GeometryObject]:

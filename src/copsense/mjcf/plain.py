@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from copsense.description import Description
 from copsense.errors import ModelLoadError
-from copsense.mjcf.reading import MjcfReading
+from copsense.mjcf.mjcf_reading import MjcfReading
 
 _REMEDY = 'Install MuJoCo, which reads it: pip install "copsense[sim]"'
 
