@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -102,20 +103,22 @@ def read_stance(
                 "--sole-height and --contact-at sole both say where the contacts are. Give one."
             )
         contact_at = "frame"  # moved by the height, and no farther
-    chosen = _read_contacts(robot, contacts, sole, sole_height)
     # A preset is passed by name, so that its feet and posture come along.
     source = (
         robot
         if robot in PRESETS
-        else load_robot(robot, package_dirs=package_dirs, frames=_frames(chosen))
+        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
     )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
+    named = any(":" in text for text in contacts)
+    model = load_robot(source) if posture or named else None
     # Which unit a bare number has depends on the joint.
-    positions = read_positions(posture, load_robot(source)) if posture else {}
+    positions = read_positions(posture, model) if model is not None else {}
+    frames = model.frame_names if model is not None else ()
     return load_stance(
         source,
-        contacts=chosen,
+        contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=positions,
@@ -125,22 +128,24 @@ def read_stance(
 
 
 def _read_contacts(
-    robot: str, texts: tuple[str, ...], sole: str | None, sole_height: float | None
+    robot: str,
+    texts: tuple[str, ...],
+    frames: Collection[str],
+    sole: str | None,
+    sole_height: float | None,
 ) -> list[str | Contact] | None:
     """``FRAME[:KIND]`` options as contacts; a frame alone takes what its preset knows of it."""
     from dataclasses import replace
 
-    from copsense.contact import COMPONENTS, Contact, rectangle
+    from copsense.contact import Contact, rectangle
     from copsense.robots import PRESETS
 
     known = PRESETS[robot].contacts if robot in PRESETS else ()
     contacts: list[Contact] = [] if texts else list(known)
     for text in texts:
-        frame, colon, kind = text.partition(":")
-        if colon and kind not in COMPONENTS:
-            raise UnknownNameError("kind of contact", kind, COMPONENTS)
+        frame, kind = _frame_and_kind(text, frames)
         own = next((c for c in known if c.frame == frame), Contact(frame))
-        contacts.append(replace(own, kind=kind) if colon else own)  # type: ignore[arg-type]
+        contacts.append(own if kind is None else replace(own, kind=kind))  # type: ignore[arg-type]
     described = sole is not None or sole_height is not None
     if described and contacts and all(c.kind == "point" for c in contacts):
         raise InvalidInputError(
@@ -157,8 +162,28 @@ def _read_contacts(
     return list(contacts) or None
 
 
-def _frames(contacts: list[str | Contact] | None) -> list[str]:
-    return [c if isinstance(c, str) else c.frame for c in contacts or ()]
+def _possible_frames(texts: tuple[str, ...]) -> list[str]:
+    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
+    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
+
+
+def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:
+    """``FRAME[:KIND]`` taken apart: names may hold colons themselves, as in ``robot::l_foot``.
+
+    Args:
+        text: the option.
+        frames: the robot's frames, of which the longest that fits is meant.
+    """
+    from copsense.contact import COMPONENTS
+
+    frame, colon, kind = text.rpartition(":")
+    if not colon or text in frames:
+        return text, None
+    if kind in COMPONENTS:
+        return frame, kind
+    if frame in frames:
+        raise UnknownNameError("kind of contact", kind, COMPONENTS)
+    return text, None  # the look-up of the frame reports what there is
 
 
 def _raised(contact: Contact, height: float) -> Contact:
@@ -177,8 +202,10 @@ def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]
             f"the sole {text!r} is not understood. Give X0:X1:Y0:Y1 [m], such as "
             "-0.07:0.12:-0.045:0.05."
         ) from None
-    if not (-math.inf < x0 < x1 < math.inf and -math.inf < y0 < y1 < math.inf):
+    finite = all(map(math.isfinite, (x0, x1, y0, y1)))
+    if not (finite and x0 <= x1 and y0 <= y1 and (x0 < x1 or y0 < y1)):
         raise InvalidInputError(
-            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]."
+            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]; one pair may "
+            "be equal, for a sole that is a line."
         )
     return (x0, x1), (y0, y1)

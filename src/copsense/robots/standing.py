@@ -20,7 +20,7 @@ from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, Un
 from copsense.posture import solve_posture
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS, Preset, preset_robot
-from copsense.sole import read_sole
+from copsense.sole import read_sole, tilt_text
 from copsense.stance import Stance
 
 ContactAt = Literal["frame", "sole"]
@@ -267,6 +267,14 @@ def _complete(
             )
             completed.append(contact)
             continue
+        if sole.tilt and contact.polygon is None:
+            warnings.warn(
+                f"contact {contact.name!r} was given the lowest edge alone as its sole, because "
+                f"{tilt_text(contact, sole.tilt)}. Turn the contact by its rotation so that the "
+                "underside lies flat, or give the polygon.",
+                ContactGeometryWarning,
+                stacklevel=3,
+            )
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if lower:
             offset = offset + up * (sole.height - up @ offset)
