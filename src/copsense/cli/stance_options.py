@@ -108,7 +108,11 @@ def read_stance(
             )
         contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
-    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    source = (
+        robot
+        if robot in PRESETS
+        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
+    )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     named = any(":" in text for text in contacts)
@@ -161,6 +165,11 @@ def _read_contacts(
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
         contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
+
+
+def _possible_frames(texts: tuple[str, ...]) -> list[str]:
+    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
+    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
 
 
 def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:
