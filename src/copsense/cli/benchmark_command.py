@@ -218,7 +218,7 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     notes: list[str] = []
     for source, frames in dict.fromkeys(asked):
         if source not in PRESETS or frames:
-            robot = load_robot(source)
+            robot = load_robot(source, frames=frames)
             for frame in frames:
                 robot.frame(frame)
             notes += [f"{robot.name}: {note}" for note in robot.notes]

@@ -126,16 +126,17 @@ def _read_path(
 
 def _note_joints(swept: Sweep, robot: Robot) -> None:
     """Say which joints are beyond their limits on the way."""
+    import numpy as np
+
     from copsense.analysis.joint_notes import ROUNDING, distance_text
 
-    units = dict(zip(robot.dof_names, robot.dof_units, strict=True))
-    for name in swept.labels("joint"):
-        excess = swept["joint_limit_excess"].sel(joint=name)
-        count, most = int((excess > ROUNDING).sum()), float(excess.max())
+    every = swept["joint_limit_excess"].values
+    for name, unit, excess in zip(robot.dof_names, robot.dof_units, every.T, strict=True):
+        count, most = int((excess > ROUNDING).sum()), float(np.nanmax(excess, initial=0.0))
         if count:
             click.echo(
                 f"note: {name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up "
-                f"to {distance_text(most, units[name])}",
+                f"to {distance_text(most, unit)}",
                 err=True,
             )
 
