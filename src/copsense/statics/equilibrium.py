@@ -63,6 +63,11 @@ class StaticEquilibrium:
             f"largest torque {np.abs(self.torques).max(initial=0.0):.4g})"
         )
 
+    @property
+    def contact_forces(self) -> Float[np.ndarray, " m"]:
+        """Stacked forces of the contacts alone (m,), contact axes [N, Nm]."""
+        return self.forces[: len(self.stance.row_names)]
+
     @array_property
     def wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """Wrench of the environment on the robot at each contact [N, Nm].
