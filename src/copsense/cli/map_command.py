@@ -166,7 +166,7 @@ def map_command(
     if plot is not None:
         _draw(stance, summary, plot, pair, marginal, force)
     if as_json:
-        echo_json(_as_json(summary, plot))
+        echo_json(_as_json(summary, plot) | {"notes": list(stance.robot.notes)})
     else:
         _print(summary, plot)
     click.get_current_context().exit(1 if _failures(summary) else 0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,12 @@ PICTURES = (".png", ".svg", ".pdf")
 def echo_json(value: Mapping[str, Any]) -> None:
     """Print JSON; infinities, which JSON lacks, become null."""
     click.echo(json.dumps(json_data(value), indent=2, allow_nan=False))
+
+
+def echo_notes(notes: Iterable[str]) -> None:
+    """Print notes on standard error, where they stay out of what is piped on."""
+    for note in notes:
+        click.echo(f"note: {note}", err=True)
 
 
 def echo_written(*paths: str | Path | None) -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from copsense.cli.limit_options import limits_option
+from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -72,6 +75,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        load_options,
         limits_option,
     ]
     return with_options(options, command)
@@ -87,8 +91,14 @@ def read_stance(
     posture: tuple[str, ...],
     base_yaw: float | None,
     width: float | None,
+    loads: tuple[str, ...] = (),
+    payloads: tuple[str, ...] = (),
 ) -> Stance:
-    """The stance that the options of `stance_options` describe; lengths [m], angles [rad]."""
+    """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
+
+    The robot's notes are printed.
+    """
+    from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
     if sole_height is not None:
@@ -98,39 +108,49 @@ def read_stance(
             )
         contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
-    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
-    # Which unit a bare number has depends on the joint.
-    positions = (
-        read_positions(posture, load_robot(robot, package_dirs=package_dirs)) if posture else {}
+    source = (
+        robot
+        if robot in PRESETS
+        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
     )
-    return load_stance(
+    if isinstance(source, Robot):
+        echo_notes(source.notes)  # at once: what is not used may be why it does not stand
+    named = any(":" in text for text in contacts)
+    model = load_robot(source) if posture or named else None
+    # Which unit a bare number has depends on the joint.
+    positions = read_positions(posture, model) if model is not None else {}
+    frames = model.frame_names if model is not None else ()
+    stance = load_stance(
         source,
-        contacts=_read_contacts(robot, contacts, sole, sole_height),
+        contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=positions,
         base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
         width=width,
     )
+    return put_loads(stance, loads, payloads)
 
 
 def _read_contacts(
-    robot: str, texts: tuple[str, ...], sole: str | None, sole_height: float | None
+    robot: str,
+    texts: tuple[str, ...],
+    frames: Collection[str],
+    sole: str | None,
+    sole_height: float | None,
 ) -> list[str | Contact] | None:
     """``FRAME[:KIND]`` options as contacts; a frame alone takes what its preset knows of it."""
     from dataclasses import replace
 
-    from copsense.contact import COMPONENTS, Contact, rectangle
+    from copsense.contact import Contact, rectangle
     from copsense.robots import PRESETS
 
     known = PRESETS[robot].contacts if robot in PRESETS else ()
     contacts: list[Contact] = [] if texts else list(known)
     for text in texts:
-        frame, colon, kind = text.partition(":")
-        if colon and kind not in COMPONENTS:
-            raise UnknownNameError("kind of contact", kind, COMPONENTS)
+        frame, kind = _frame_and_kind(text, frames)
         own = next((c for c in known if c.frame == frame), Contact(frame))
-        contacts.append(replace(own, kind=kind) if colon else own)  # type: ignore[arg-type]
+        contacts.append(own if kind is None else replace(own, kind=kind))  # type: ignore[arg-type]
     described = sole is not None or sole_height is not None
     if described and contacts and all(c.kind == "point" for c in contacts):
         raise InvalidInputError(
@@ -145,6 +165,30 @@ def _read_contacts(
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
         contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
+
+
+def _possible_frames(texts: tuple[str, ...]) -> list[str]:
+    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
+    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
+
+
+def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:
+    """``FRAME[:KIND]`` taken apart: names may hold colons themselves, as in ``robot::l_foot``.
+
+    Args:
+        text: the option.
+        frames: the robot's frames, of which the longest that fits is meant.
+    """
+    from copsense.contact import COMPONENTS
+
+    frame, colon, kind = text.rpartition(":")
+    if not colon or text in frames:
+        return text, None
+    if kind in COMPONENTS:
+        return frame, kind
+    if frame in frames:
+        raise UnknownNameError("kind of contact", kind, COMPONENTS)
+    return text, None  # the look-up of the frame reports what there is
 
 
 def _raised(contact: Contact, height: float) -> Contact:
@@ -163,8 +207,10 @@ def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]
             f"the sole {text!r} is not understood. Give X0:X1:Y0:Y1 [m], such as "
             "-0.07:0.12:-0.045:0.05."
         ) from None
-    if not (-math.inf < x0 < x1 < math.inf and -math.inf < y0 < y1 < math.inf):
+    finite = all(map(math.isfinite, (x0, x1, y0, y1)))
+    if not (finite and x0 <= x1 and y0 <= y1 and (x0 < x1 or y0 < y1)):
         raise InvalidInputError(
-            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]."
+            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]; one pair may "
+            "be equal, for a sole that is a line."
         )
     return (x0, x1), (y0, y1)

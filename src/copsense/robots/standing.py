@@ -20,7 +20,7 @@ from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, Un
 from copsense.posture import solve_posture
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS, Preset, preset_robot
-from copsense.sole import read_sole
+from copsense.sole import read_sole, tilt_text
 from copsense.stance import Stance
 
 ContactAt = Literal["frame", "sole"]
@@ -31,14 +31,30 @@ class ContactGeometryWarning(UserWarning):
     """A contact frame is not on the sole that the collision geometry shows."""
 
 
-def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | Path] = ()) -> Robot:
+def load_robot(
+    source: str | Path | Robot | pin.Model,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    frames: Iterable[str] = (),
+    root: str | None = None,
+) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
+    Args:
+        source: what to load; a `Robot` is returned as it is.
+        package_dirs: folders that hold the packages of ``package://`` meshes.
+        frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
+            tree that holds them is the robot.
+        root: name of a body of the robot that is meant, where an MJCF holds several.
+
     Raises:
-        UnknownNameError: neither a preset nor a file.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`.
         ModelLoadError: the file cannot be read.
+        InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
+    if isinstance(source, Robot):
+        return source
     if isinstance(source, pin.Model):
         return Robot.from_model(source)
     if str(source) in PRESETS:
@@ -49,7 +65,9 @@ def load_robot(source: str | Path | pin.Model, *, package_dirs: Iterable[str | P
         path.parent == Path()
     ):
         raise UnknownNameError("robot", text, PRESETS, "Or give the path of a URDF or MJCF file.")
-    return Robot.from_description(load_description(source, package_dirs=package_dirs))
+    return Robot.from_description(
+        load_description(source, None, package_dirs, frames=frames, root=root)
+    )
 
 
 def load_stance(
@@ -83,7 +101,7 @@ def load_stance(
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = source if isinstance(source, Robot) else load_robot(source, package_dirs=package_dirs)
+    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -195,6 +213,13 @@ def likely_feet(robot: Robot) -> tuple[str, ...]:
     return tuple(n for n in dict.fromkeys(robot.frame_names) if any(w in n.lower() for w in words))
 
 
+def _frames(contacts: object) -> tuple[str, ...]:
+    """Frames named by contacts of any kind; what is none is rejected elsewhere."""
+    given = contacts if isinstance(contacts, Sequence) and not isinstance(contacts, str) else ()
+    frames = [c.frame if isinstance(c, Contact) else c for c in given]
+    return tuple(frame for frame in frames if isinstance(frame, str))
+
+
 def _contact(given: object, known: Mapping[str, Contact]) -> Contact:
     """A contact, or a frame's name as what the preset knows of it, else a surface contact."""
     if isinstance(given, str):
@@ -242,6 +267,14 @@ def _complete(
             )
             completed.append(contact)
             continue
+        if sole.tilt and contact.polygon is None:
+            warnings.warn(
+                f"contact {contact.name!r} was given the lowest edge alone as its sole, because "
+                f"{tilt_text(contact, sole.tilt)}. Turn the contact by its rotation so that the "
+                "underside lies flat, or give the polygon.",
+                ContactGeometryWarning,
+                stacklevel=3,
+            )
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if lower:
             offset = offset + up * (sole.height - up @ offset)

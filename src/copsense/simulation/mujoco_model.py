@@ -35,6 +35,12 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
             f"robot {robot.name!r} moves in a plane, the simulation in space. Use a robot with a "
             "free-floating base."
         )
+    if robot.drives or stance.loads:
+        raise InvalidInputError(
+            f"robot {robot.name!r} has joints without a motor of their own, springs, loops, or "
+            "loads on it, which are not simulated. Analyse it at rest, or simulate it without: "
+            "stance.with_loads(()), robot.with_drives(Drives())."
+        )
     spec = mujoco.MjSpec()
     spec.compiler.autolimits = False
     option = spec.option
@@ -44,6 +50,8 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     option.impratio, option.tolerance, option.iterations = settings.impedance_ratio, 1e-10, 100
     # Without this flag a fall restarts the simulation without an error.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    # One robot is one island: to look for others, and to copy its matrices, would be wasted.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     bodies = {0: spec.worldbody}
     for i in range(1, model.njoints):
         bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])

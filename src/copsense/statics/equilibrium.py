@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
-from copsense.criterion import Criterion
-from copsense.errors import InvalidInputError
+from copsense.criterion import Criterion, minimum_wrench
+from copsense.errors import InvalidInputError, UnbalancedError, UndeterminedWrenchError
 from copsense.load_problem import LoadProblem
+from copsense.robot import Robot
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
 from copsense.statics.policy import BALANCE, WrenchPolicy, policy_forces, policy_name
 
+INTERNAL = 1e-8  # of J' f, for f of length one, under which no joint feels forces
 UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
 PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
 
@@ -27,8 +29,10 @@ class StaticEquilibrium:
     Attributes:
         stance: the stance.
         criterion: what chose the wrenches; a `Criterion` or a `WrenchPolicy`, q -> wrenches.
-        forces: stacked contact forces (m,), contact axes [N, Nm].
-        torques: joint torques (n,) [Nm, or N for a prismatic joint].
+        forces: stacked contact forces, contact axes [N, Nm], then those that keep the robot's own
+            loops and couplings closed (c,); see `wrenches` and `loop_forces`.
+        torques: motor torques (n,) [Nm, or N for a prismatic joint], of every joint that has a
+            motor; see `joint_torques`.
         multipliers: nu (nv,), the sensitivity of the cost to the gravity terms; zero for a policy.
     """
 
@@ -60,6 +64,11 @@ class StaticEquilibrium:
             f"largest torque {np.abs(self.torques).max(initial=0.0):.4g})"
         )
 
+    @property
+    def contact_forces(self) -> Float[np.ndarray, " m"]:
+        """Stacked forces of the contacts alone (m,), contact axes [N, Nm]."""
+        return self.forces[: len(self.stance.row_names)]
+
     @array_property
     def wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """Wrench of the environment on the robot at each contact [N, Nm].
@@ -72,6 +81,24 @@ class StaticEquilibrium:
     def world_wrenches(self) -> Float[np.ndarray, "nc 6"]:
         """The same wrenches in world axes, about the same points [N, Nm]."""
         return self.stance.in_world_axes(self.wrenches)
+
+    @property
+    def loop_forces(self) -> dict[str, float]:
+        """What keeps the robot's loops and couplings closed: name of the row -> force [N, Nm].
+
+        Of a ball joint, the force on its first frame in world axes; of a weld, force and moment in
+        the frame's axes. Where rows depend on each other, as in a loop that moves in a plane, it is
+        the smallest of the sets of forces that do the same.
+        """
+        if self.stance.closures is None:
+            return {}
+        found = self.stance.loop_forces(self.forces).tolist()
+        return dict(zip(self.stance.closures.names, found, strict=True))
+
+    @array_property
+    def joint_torques(self) -> Float[np.ndarray, " n"]:
+        """Torque of the motors on each joint (n,), zero where none drives it [Nm, or N]."""
+        return np.array(self.stance.robot.joint_torques(self.torques))
 
     @property
     def unloaded(self) -> tuple[str, ...]:
@@ -87,9 +114,10 @@ class StaticEquilibrium:
         """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
         stance, robot = self.stance, self.stance.robot
         needed = np.array(
-            rigid_body.torques_at_rest(robot, stance.q, stance.joint_wrenches(self.forces))
+            rigid_body.torques_at_rest(robot, stance.q, stance.spatial_forces(self.forces))
         )
-        needed[robot.base_nv :] -= self.torques
+        needed -= stance.joint_loads(self.forces)
+        needed[robot.base_nv :] -= self.joint_torques
         return float(np.abs(needed).max())
 
     def derivative(
@@ -147,6 +175,28 @@ def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticE
     return StaticEquilibrium(stance, criterion, forces, torques, nu, _system=system)
 
 
+def with_tie_break(stance: Stance, criterion: Criterion) -> Criterion:
+    """The criterion, with ``minimum_wrench(1.0)`` as its tie-break where it needs one.
+
+    It needs one where contacts can push against each other without moving anything (heel and toe
+    of one foot, four points under it): such forces cost nothing that the criterion weighs.
+
+    Raises:
+        UndeterminedWrenchError: more than such internal forces is undetermined.
+        InvalidInputError: weights that do not fit.
+    """
+    try:
+        Kkt(stance, criterion)
+    except UndeterminedWrenchError as error:
+        tied = replace(criterion, tie_break=minimum_wrench(1.0))
+        free = Kkt(stance, tied).free
+        felt = np.abs(stance.constraints.T @ free).max(initial=0.0)
+        if criterion.tie_break is not None or felt > INTERNAL:
+            raise error
+        return tied
+    return criterion
+
+
 def share_load(
     stance: Stance, criterion: Criterion, problem: LoadProblem
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"]]:
@@ -174,6 +224,9 @@ def _balanced(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The system's solution of a load, validated."""
     found = system.share(problem)
+    robot = system.stance.robot
+    if robot.unactuated_nv > robot.base_nv or system.stance.closures is not None:
+        _require_balance(robot, problem)
     if not problem.imbalance(found[0]) <= BALANCE * system.stance.robot.weight:
         raise InvalidInputError(
             f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
@@ -182,7 +235,23 @@ def _balanced(
     return found
 
 
+def _require_balance(robot: Robot, problem: LoadProblem) -> None:
+    """Reject a load that joints without a motor leave without an answer."""
+    forces = np.linalg.lstsq(problem.base_map, problem.base_wrench, rcond=1e-10)[0]
+    rest = np.concatenate(
+        [problem.base_wrench - problem.base_map @ forces, np.zeros(len(problem.torque_offset))]
+    )
+    missing = robot.from_drives(rest)
+    if np.abs(missing).max() > BALANCE * robot.weight:
+        largest = np.argsort(-np.abs(missing))[:6]
+        names = robot.velocity_names
+        lacking = {
+            names[i]: float(missing[i]) for i in largest if abs(missing[i]) > BALANCE * robot.weight
+        }
+        raise UnbalancedError(robot.name, lacking)
+
+
 def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
     """Whether velocities (nv,) or (nv, p) leave the contacts at rest, within 1e-6."""
-    moved = np.abs(stance.jacobian @ directions).max(initial=0.0)
+    moved = np.abs(stance.constraints @ directions).max(initial=0.0)
     return bool(moved <= 1e-6 * max(1.0, float(np.abs(directions).max(initial=0.0))))

@@ -37,8 +37,10 @@ class Kkt:
         self.stance = stance
         self.problem: LoadProblem = LoadProblem.of(stance)
         self.quadratic: Quadratic = criterion.at(stance)
-        self.nb: int = stance.robot.base_nv
-        J, quadratic = stance.jacobian, self.quadratic
+        self.nb: int = stance.robot.unactuated_nv
+        quadratic = self.quadratic
+        # Columns in the order of `Robot.by_drive`.
+        J: Float[np.ndarray, "m nv"] = stance.robot.by_drive(stance.constraints.T).T
         self.on: Bool[np.ndarray, " nv"] = np.concatenate(
             [np.ones(self.nb, bool), quadratic.active]
         )
@@ -57,6 +59,9 @@ class Kkt:
             # free too (a massless foot), which changes neither forces nor torques.
             _, s, vt = np.linalg.svd(np.vstack([J[:, self.on].T, quadratic.wrench]))
             self.free = vt[int(np.sum(s > _NULL * s[0])) :].T
+            # Forces of loops alone may be free: contacts and motors do not feel them.
+            if np.abs(self.free[: len(stance.row_names)]).max(initial=0.0) < _NULL:
+                self.free = self.free[:, :0]
             self.system.use_pseudo_inverse()
         self.tie: TieBreak | None = None
         if self.free.shape[1]:
@@ -78,18 +83,19 @@ class Kkt:
             x[self.size :] += self.tie.move(problem, x[self.size :])
         nu = np.zeros(len(self.on))
         nu[self.on], forces = x[: self.size], x[self.size :]
-        return forces, problem.torques(forces), nu
+        return forces, problem.torques(forces), self.stance.robot.from_drives(nu)
 
     def derivative(
         self, at: StaticEquilibrium, V: Float[np.ndarray, "nv p"]
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
         """Derivatives of forces and torques along admissible velocities V."""
         stance = self.stance
-        AV = stance.balance_derivative(at.forces).dot(V)
+        AV = stance.robot.by_drive(stance.balance_derivative(at.forces).dot(V))
         right = np.empty((self.size + len(self.free), V.shape[1]))
         right[: self.size] = AV[self.on]
         if self.quadratic.inertia:
-            change = self.quadratic.compliance_derivative(stance, self.problem, at.multipliers)
+            nu = stance.robot.in_drives(at.multipliers)
+            change = self.quadratic.compliance_derivative(stance, self.problem, nu)
             right[self.nb : self.size] -= change @ V
         right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
         dx = self.system.solve(right)
@@ -154,7 +160,11 @@ class TieBreak:
         w = np.zeros(len(first.on))
         w[first.on] = x[: first.size]
         w[nb:] -= W @ at.torques
-        change = stance.motion_derivative(w) @ V - first.problem.joint_map.T @ W @ AV[nb:] + H @ df
+        change = (
+            stance.motion_derivative(stance.robot.from_drives(w)) @ V
+            - first.problem.joint_map.T @ W @ AV[nb:]
+            + H @ df
+        )
         return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
 
 

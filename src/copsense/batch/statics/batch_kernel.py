@@ -78,7 +78,7 @@ class BatchKernel:
         self._expected = arrays_of(self.empty(0))
         served = kernel_criteria(stance, self.criteria)
         self._serves_all = len(served.column) == len(self.criteria)
-        self.fallback_reason = why_not_covered(stance.robot, tuple(stance.contacts))
+        self.fallback_reason = why_not_covered(stance)
         if not self.fallback_reason and not len(served.column):
             self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
         if not self.fallback_reason:

@@ -1,0 +1,177 @@
+"""URDF: its faults, what a parser drops from it, and a base that is written into it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Iterator
+
+from copsense.xml_numbers import read_numbers, wrong_number
+
+_JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+_SHAPES = ("box", "cylinder", "sphere", "mesh")
+# How many numbers an attribute of an element holds.
+_NUMBERS = {
+    "origin": {"xyz": 3, "rpy": 3},
+    "axis": {"xyz": 3},
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), 1),
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+}
+# Attributes without which the parser drops the element, or rejects the file.
+_NEEDED = {"mass": ("value",), "limit": ("effort", "velocity")}
+
+
+def without_namespace(root: ET.Element) -> bool:
+    """Take the default namespace off every name, as URDF's parser does; whether there was one."""
+    space, brace, _ = root.tag.partition("}")
+    if not brace:
+        return False
+    for element in root.iter():
+        if isinstance(element.tag, str):
+            element.tag = element.tag.removeprefix(space + brace)
+    return True
+
+
+def xacro_left(root: ET.Element) -> tuple[str, ...]:
+    """What of xacro a file still holds: elements, and attributes with ``${...}`` or ``$(...)``."""
+    found = []
+    for element in root.iter():
+        space, _, name = str(element.tag).rpartition("}")
+        if "xacro" in space:
+            found.append(f"<xacro:{name}>")
+        for key, value in element.items():
+            if "${" in value or "$(" in value:
+                found.append(f"{key}={value!r}")
+    return tuple(dict.fromkeys(found))
+
+
+def urdf_faults(root: ET.Element) -> Iterator[str]:
+    """What the parser rejects without saying where, drops, or takes for something else."""
+    links, joints = root.findall("link"), root.findall("joint")
+    names = [link.get("name", "") for link in links]
+    if not root.get("name"):
+        yield "the <robot> has no name"
+    if not links:
+        yield "it has no link"
+    for kind, elements in (("link", links), ("joint", joints)):
+        for name, times in Counter(e.get("name", "") for e in elements).items():
+            if not name:
+                yield f"a {kind} has no name"
+            elif times > 1:
+                yield f"{times} {kind}s are named {name!r}"
+    for joint in joints:
+        yield from _joint_faults(joint, names)
+    for body in links:
+        yield from _inertial_faults(body)
+    yield from _tree_faults(names, joints)
+
+
+def _joint_faults(joint: ET.Element, links: list[str]) -> Iterator[str]:
+    where, kind = f"joint {joint.get('name', '')!r}", joint.get("type")
+    if kind not in _JOINT_TYPES:
+        yield f"{where} is of type {kind!r}, not {', '.join(_JOINT_TYPES)}"
+    for end in ("parent", "child"):
+        if _end(joint, end) not in links:
+            yield f"the {end} link {_end(joint, end)!r} of {where} does not exist"
+    yield from _wrong_numbers(joint, where)
+    axis = joint.find("axis")
+    if axis is not None and kind not in ("fixed", "floating"):
+        numbers = read_numbers(axis.get("xyz", "1 0 0"))
+        if numbers and not any(numbers):
+            yield f"the axis of {where} has no direction"
+    if kind in ("revolute", "prismatic"):
+        if joint.find("limit") is None:
+            other = ", or make it continuous" if kind == "revolute" else ""
+            yield (
+                f"{where} is {kind} and has no <limit>: give it one with lower, upper, effort and "
+                f"velocity{other}"
+            )
+        yield from _missing(joint, "limit", where)
+
+
+def _inertial_faults(body: ET.Element) -> Iterator[str]:
+    where, inertial = f"link {body.get('name', '')!r}", body.find("inertial")
+    if inertial is None:
+        return
+    yield from _wrong_numbers(inertial, where)
+    mass = inertial.find("mass")
+    if mass is None:
+        yield (
+            f"the <inertial> of {where} has no <mass>, so that its mass would be lost: give it, or "
+            "leave the <inertial> out of a link without mass"
+        )
+        return
+    yield from _missing(inertial, "mass", where)
+    numbers = read_numbers(mass.get("value", ""))
+    if numbers and numbers[0] < 0:
+        yield f"the mass of {where} is negative, {numbers[0]:g} kg"
+
+
+def _tree_faults(names: list[str], joints: list[ET.Element]) -> Iterator[str]:
+    children = [child for j in joints if (child := _end(j, "child")) in names]
+    for child, count in Counter(children).items():
+        if count > 1:
+            yield f"link {child!r} is the child of {count} joints: it must be a tree"
+    roots = [name for name in names if name not in children]
+    if names and not roots:
+        yield "every link is the child of another: it must be a tree with one root"
+    elif len(roots) > 1:
+        yield (
+            f"links {', '.join(map(repr, roots))} are the child of no joint: it must be a tree "
+            "with one root, so join them or remove those that do not belong to the robot"
+        )
+    elif roots:
+        held = _below(roots[0], joints)
+        lost = [name for name in names if name not in held]
+        if lost:
+            yield f"links {', '.join(map(repr, lost))} hang on one another and not on the root"
+
+
+def urdf_notes(root: ET.Element) -> Iterator[str]:
+    """What the parser leaves out of a file without faults, a sentence each."""
+    for body in root.findall("link"):
+        where, inertial = f"link {body.get('name', '')!r}", body.find("inertial")
+        if inertial is not None and inertial.find("inertia") is None:
+            yield f"The <inertial> of {where} has no <inertia>: its mass is taken as a point."
+        for collision in body.findall("collision"):
+            shapes = [shape.tag for shape in collision.findall("geometry/*")]
+            if not set(shapes) & set(_SHAPES):
+                what = ", ".join(f"<{shape}>" for shape in shapes) or "nothing"
+                yield (
+                    f"A collision shape of {where} is left out: its <geometry> holds {what}, not "
+                    f"{', '.join(_SHAPES)}."
+                )
+
+
+def _wrong_numbers(parent: ET.Element, where: str) -> Iterator[str]:
+    for element in parent:
+        for attribute, count in _NUMBERS.get(element.tag, {}).items():
+            yield from wrong_number(element, attribute, count, f"<{element.tag}> of {where}")
+
+
+def _missing(parent: ET.Element, tag: str, where: str) -> Iterator[str]:
+    element = parent.find(tag)
+    if element is not None:
+        for attribute in _NEEDED[tag]:
+            if element.get(attribute) is None:
+                yield f"the <{tag}> of {where} has no {attribute}"
+
+
+def _end(joint: ET.Element, end: str) -> str | None:
+    """The link at a joint's ``"parent"`` or ``"child"`` end."""
+    element = joint.find(end)
+    return None if element is None else element.get("link")
+
+
+def _below(link: str, joints: list[ET.Element]) -> set[str]:
+    """A link and all that hangs on it."""
+    held, waiting = {link}, [link]
+    while waiting:
+        parent = waiting.pop()
+        for joint in joints:
+            child = _end(joint, "child")
+            if _end(joint, "parent") == parent and child is not None and child not in held:
+                held.add(child)
+                waiting.append(child)
+    return held

@@ -1,0 +1,87 @@
+"""A sole that is tilted against its frame is named with its angle; one that is a line stands."""
+
+import warnings
+
+import numpy as np
+import pytest
+from support.tiny import FEET, MJCF, urdf
+
+import copsense
+from copsense import Contact
+from copsense.errors import ModelLoadError
+from copsense.polygon import Polygon
+from copsense.sole import read_sole
+
+
+def tilted(roll=0.0, pitch=0.0, shape='<box size="0.2 0.1 0.02"/>'):
+    """The tiny robot with feet turned by roll and pitch [deg] against their frames."""
+    r, p = np.radians([roll, pitch])
+    return urdf(
+        f'<collision><origin rpy="{r} {p} 0" xyz="0 0 0"/><geometry>{shape}</geometry></collision>'
+    )
+
+
+def sole_of(text):
+    return read_sole(copsense.Robot.from_urdf(text), Contact("left"))
+
+
+@pytest.mark.parametrize("degrees", [1.5, -4.0, 12.0])
+@pytest.mark.parametrize("way", ["roll", "pitch"])
+def test_the_tilt_of_a_box_is_the_angle_it_was_turned_by(way, degrees):
+    sole = sole_of(tilted(**{way: degrees}))
+    assert np.degrees(sole.tilt) == pytest.approx(abs(degrees), abs=1e-2)
+    assert len(sole.polygon) == 2
+
+
+def test_a_level_box_and_one_within_the_lowest_millimetre_have_no_tilt():
+    assert sole_of(tilted()).tilt == 0.0
+    nearly = sole_of(tilted(roll=0.3))  # 0.1 m wide: 0.5 mm
+    assert nearly.tilt == 0.0
+    assert len(nearly.polygon) == 4
+
+
+def test_a_tilted_sole_is_named_with_its_angle_and_its_frame():
+    with pytest.warns(copsense.robots.ContactGeometryWarning, match="tilted") as notes:
+        copsense.load_stance(tilted(pitch=3.0), contacts=FEET, contact_at="sole")
+    said = [str(note.message) for note in notes if "tilted by 3.0 deg" in str(note.message)]
+    assert [frame for frame in FEET if any(f"frame '{frame}'" in s for s in said)] == FEET
+
+
+def test_a_sole_tilted_both_ways_touches_in_a_corner_and_says_why():
+    with pytest.raises(ModelLoadError, match=r"single point.*because .*tilted by 5\.0 deg.*Turn"):
+        sole_of(tilted(roll=3.0, pitch=4.0))
+
+
+def test_a_given_polygon_needs_no_word_about_the_tilt():
+    contacts = [Contact(f, polygon=copsense.rectangle((-0.1, 0.1), (-0.05, 0.05))) for f in FEET]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        copsense.load_stance(tilted(pitch=3.0), contacts=contacts, contact_at="frame")
+
+
+def test_a_capsule_lies_on_a_line_and_a_sloping_one_says_its_slope():
+    def sole(degrees):
+        capsule = f'<geom type="capsule" size=".02 .05" euler="0 {degrees} 0"/>'
+        text = MJCF.replace('<geom type="box" size=".1 .05 .01"/>', capsule)
+        return read_sole(copsense.load_robot(text), Contact("left"))
+
+    assert len(sole(90).polygon) == 2
+    assert sole(90).tilt == 0.0
+    with pytest.raises(ModelLoadError, match=r"tilted by 6\.0 deg"):
+        sole(96)
+
+
+def test_any_line_is_a_polygon_whose_margin_is_to_its_nearer_end():
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        ends = rng.uniform(-0.2, 0.2, (2, 2))
+        if rng.random() < 0.3:
+            ends[1, rng.integers(2)] = 0.0
+            ends[0] *= ends[1] != 0  # along an axis
+            ends[0] -= 0.1 * ends[1]
+        share = rng.uniform(0.0, 1.0)
+        point = ends[0] + share * (ends[1] - ends[0])
+        expected = min(share, 1 - share) * np.linalg.norm(ends[1] - ends[0])
+        sole = Contact("foot", polygon=ends).sole
+        assert isinstance(sole, Polygon)
+        assert sole.margin(point).distance == pytest.approx(expected, abs=1e-12)
