@@ -12,6 +12,15 @@ from copsense.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from copsense.limits import Limits
 
+# Of each limit that can be switched off, a value that may be written.
+_EXAMPLES = {
+    "normal-force": "5",
+    "friction": "0.33",
+    "cop-margin": "0.005",
+    "torsion": "0.02",
+    "torque": "model",
+}
+
 
 def limits_option(command: F) -> F:
     """The option itself, to decorate a command with."""
@@ -67,6 +76,10 @@ def _limit_value(name: str, value: str) -> float | int | str | None:
     try:
         return int(value) if name == "sides" else float(value)
     except ValueError:
+        if name == "sides":
+            remedy = "Write a whole number from 3, such as sides=8"
+        else:
+            remedy = f"Write, say, {name}={_EXAMPLES[name]} or {name}=off"
         raise InvalidInputError(
-            f"the limit {name}={value!r} is not a number. Write, say, {name}=8 or {name}=off."
+            f"the limit {name}={value!r} is not understood. {remedy}."
         ) from None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.regions.feasible_region import com_region
@@ -36,6 +37,10 @@ class ComRegions(Mapping[str, ComRegion]):
     supported: ComRegion
     actuated: ComRegion | None
     unclipped: Mapping[str, ComRegion]
+
+    def __post_init__(self) -> None:
+        """Own the position and the mapping."""
+        freeze(self, "com", "unclipped")
 
     def __getitem__(self, name: str) -> ComRegion:
         """The region of a name."""
