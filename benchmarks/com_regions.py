@@ -31,7 +31,7 @@ from scipy.spatial import ConvexHull
 
 import copsense
 from copsense.limits import Limits, limit_rows
-from copsense.regions import ComRegion, com_region, gravity_at
+from copsense.regions import ComRegion, balance_at, com_region
 
 HERE = Path(__file__).resolve().parent
 BUILD = HERE.parent / "build" / "com_regions"
@@ -74,7 +74,7 @@ def matrices(stance: copsense.Stance, limits: Limits) -> dict[str, Any]:
     weight, com = stance.robot.weight, stance.com
     pyramid = limit_rows(stance, replace(limits, normal_force=None, torque=None)).matrix
     # The base's balance: S (c - c0) = J_b' f - G_b(c0) has two rows for c, and four without it.
-    S = np.column_stack([gravity_at(stance, com[:2] + e) - stance.gravity for e in np.eye(2)])[:6]
+    S = np.column_stack([balance_at(stance, com[:2] + e) - stance.gravity for e in np.eye(2)])[:6]
     Jb, Gb = stance.jacobian[:, :6].T, stance.gravity[:6]
     u, size, vt = np.linalg.svd(S)
     solve = vt.T @ np.diag(1 / size) @ u[:, :2].T

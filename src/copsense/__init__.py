@@ -27,8 +27,10 @@ if TYPE_CHECKING:
         weighted_torque,
     )
     from copsense.design import design_criterion
+    from copsense.drives import Drives
     from copsense.errors import CopsenseError
     from copsense.limits import Limits
+    from copsense.loads import Load
     from copsense.maps import load_map, map_postures
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.posture import solve_posture
@@ -47,7 +49,9 @@ __all__ = [
     "Contact",
     "CopsenseError",
     "Criterion",
+    "Drives",
     "Limits",
+    "Load",
     "PathScan",
     "Plane",
     "PosturePath",
@@ -106,8 +110,10 @@ _HOMES = {
         "weighted_torque",
     ),
     "copsense.design": ("design_criterion",),
+    "copsense.drives": ("Drives",),
     "copsense.errors": ("CopsenseError",),
     "copsense.limits": ("Limits",),
+    "copsense.loads": ("Load",),
     "copsense.maps": (
         "load_map",
         "map_postures",

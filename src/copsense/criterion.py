@@ -95,7 +95,10 @@ class Criterion(ByContent):
         Raises:
             InvalidInputError: weights that do not fit the stance, or are indefinite.
         """
-        return _quadratic(self, stance.robot, tuple(stance.contacts))
+        found = _quadratic(self, stance.robot, tuple(stance.contacts))
+        if stance.closures is None:
+            return found
+        return found.padded(stance.closures.basis.shape[1])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data of this criterion, for JSON or TOML: `from_dict` reads it back.

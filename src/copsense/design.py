@@ -334,7 +334,9 @@ def families(stance: Stance) -> dict[str, Family]:
 def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
     """Supporting joints in groups that share a torque weight."""
     mask = supporting_joints(stance)[stance.robot.base_nv :] > 0
-    supporting = [n for n, on in zip(stance.robot.torque_names, mask, strict=True) if on]
+    motors = set(stance.robot.torque_names)
+    joints = zip(stance.robot.dof_names, mask, strict=True)
+    supporting = [name for name, on in joints if on and name in motors]
     groups = {part: tuple(n for n in supporting if part in n.lower()) for part in _PARTS}
     groups = {part: names for part, names in groups.items() if names}
     if len(groups) > 1 and sum(len(names) for names in groups.values()) == len(supporting):

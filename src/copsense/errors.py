@@ -82,6 +82,28 @@ class ContactGeometryError(CopsenseError):
     """A contact does not lie where it was said to; the message gives the offsets."""
 
 
+class OpenLoopError(CopsenseError):
+    """A loop or coupling of the robot is open at a configuration; the message gives the gap."""
+
+
+class UnbalancedError(CopsenseError):
+    """Joints without a motor cannot be held at a posture, whatever shares the load.
+
+    Attributes:
+        lacking: joint, or direction of the base -> force or moment that is missing [N, Nm].
+    """
+
+    def __init__(self, robot: str, lacking: dict[str, float]) -> None:
+        """Compose the message from what is missing where."""
+        self.lacking = lacking
+        told = ", ".join(f"{joint} lacks {missing:.3g}" for joint, missing in lacking.items())
+        super().__init__(
+            f"nothing can hold {robot!r} at this posture: {told} (Nm, or N along a slide), for "
+            "want of a motor. Give the joint a motor, a spring or a held torque, let it hang at "
+            "its own equilibrium, or add a contact."
+        )
+
+
 class InsufficientContactsError(CopsenseError):
     """The contacts cannot carry the robot's weight, however the load is shared."""
 

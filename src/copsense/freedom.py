@@ -31,6 +31,8 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
     A joint about the named axis of the contact frame would free it.
     """
+    if stance.closures is not None:
+        return ()  # a loop's joints do not move alone
     limbs: dict[str, list[str]] = {}
     for contact in stance.contacts:
         lacks, count = _lacking(stance, contact), len(stance.limb(contact))
@@ -46,7 +48,7 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
 def freedom_notes(stance: Stance) -> tuple[str, ...]:
     """What the contacts hold twice, or hold that one would expect to move; empty where nothing."""
-    rows = len(stance.row_names)
+    rows = len(stance.constraints)
     if stance.rank == rows:
         return ()
     held = [f"CoM's {'xyz'[axis]}" for axis in held_com_axes(stance) if axis < 2]

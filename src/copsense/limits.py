@@ -193,7 +193,10 @@ class LimitRows:
         s tau_i <= t_i is the row -s J_i' f <= t_i - s tau_0i.
         """
         joint, s = self.joint, self.sign
-        A = np.vstack([self.matrix, -s[:, None] * problem.joint_map[joint]])
+        # Forces of loops and couplings, behind the contacts', have no limit of their own.
+        more = problem.joint_map.shape[1] - self.matrix.shape[1]
+        matrix = np.pad(self.matrix, ((0, 0), (0, more))) if more else self.matrix
+        A = np.vstack([matrix, -s[:, None] * problem.joint_map[joint]])
         bound = self.torque[joint] - s * problem.torque_offset[joint]
         return A, np.concatenate([self.bound, bound])
 

@@ -4,9 +4,10 @@ The one statement of "share this load": with f the stacked contact forces and ta
 
     base_map f = base_wrench        tau = torque_offset - joint_map f
 
-At rest base_map = J_b', joint_map = J_j' and the right-hand sides are gravity's, G_b and G_j; a
-controller states its own (see `controllers.balancing`). What a criterion prefers among such f is
-`Quadratic.over_forces`; what limits allow, `LimitRows.over_forces`.
+At rest base_map = J_b', joint_map = J_j' and the right-hand sides are gravity's, G_b and G_j, less
+the loads. Joints without a motor stand among the base's rows; forces of loops and couplings stand
+behind the contacts'. A controller states its own (see `controllers.balancing`). What a criterion
+prefers among such f is `Quadratic.over_forces`; what limits allow, `LimitRows.over_forces`.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class LoadProblem:
     Attributes:
         base_map: stacked contact forces to the wrench on the base (nb, m).
         base_wrench: the wanted wrench of all contacts on the base (nb,), base axes.
-        joint_map: contact forces to joint torques (n, m).
+        joint_map: contact forces to motor torques (n, m).
         torque_offset: (n,) [Nm].
         joint_inertia: M_j (n, n), for a criterion that weighs with its inverse.
     """
@@ -41,9 +42,14 @@ class LoadProblem:
 
     @classmethod
     def of(cls, stance: Stance) -> LoadProblem:
-        """The load of a stance at rest: its weight."""
-        nb, J, G = stance.robot.base_nv, stance.jacobian, stance.gravity
-        return cls(J[:, :nb].T, G[:nb], J[:, nb:].T, G[nb:], stance.mass_matrix[nb:, nb:])
+        """The load of a stance at rest: its weight, and what else is known to act on it."""
+        robot = stance.robot
+        nb, map_, N = robot.unactuated_nv, stance.constraints.T, stance.balance
+        inertia = stance.mass_matrix[robot.base_nv :, robot.base_nv :]
+        if robot.actuation is not None:
+            map_, N = robot.by_drive(map_), robot.by_drive(N)
+            inertia = robot.actuation.inverse @ inertia @ robot.actuation.inverse.T
+        return cls(map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
 
     def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
         """The torques that contact forces take (n,) [Nm]."""

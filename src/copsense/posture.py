@@ -11,6 +11,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number, owned
+from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
 from copsense.stance import RANK_TOLERANCE, Stance
@@ -123,17 +124,19 @@ def solve_posture(
     selector = np.eye(robot.model.nv)[columns]
     axes = [i for i, _ in wanted]
 
-    here, multipliers = stance, None
+    here, multipliers, hanging = stance, None, list(stance.hanging)
     for iteration in range(_MAX_ITERATIONS):
         # h(q) = 0: contacts, centre of mass, joints; C = dh/dq.
         h = np.concatenate(
             [
-                contact_error(here, places),
+                constraint_error(here, places),
+                here.balance[hanging] / robot.weight,
                 [here.com[i] - value for i, value in wanted],
                 [robot.joint_position(here.q, joint) - angle for joint, angle in joints.items()],
             ]
         )
-        C = np.vstack([here.jacobian, here.com_jacobian[axes], selector])
+        swing = here.hanging_derivative / robot.weight
+        C = np.vstack([here.constraints, swing, here.com_jacobian[axes], selector])
         A, errors, spread = _independent(here, C, h)
         gradient, hessian = _cost_derivatives(here, home, weights)
         if multipliers is None or spread is not None or len(multipliers) != len(A):
@@ -143,11 +146,12 @@ def solve_posture(
         if small < _NEWTON_REGION:
             # Curvature of the Lagrangian, sum lambda d2h: a static torque derivative in which
             # gravity stands for the CoM's multiplier and the contact forces for the feet's.
-            contact_rows = here.jacobian.shape[0]
             of_h = multipliers if spread is None else (spread @ multipliers)[: len(h)]
+            rows = len(here.constraints)
             pull = np.zeros(3)
-            pull[axes] = of_h[contact_rows : contact_rows + len(axes)]
-            hessian = hessian + here.balance_derivative(-of_h[:contact_rows], -pull / robot.mass)
+            start = rows + len(hanging)
+            pull[axes] = of_h[start : start + len(axes)]
+            hessian = hessian + here.curvature(-of_h[:rows], -pull / robot.mass)
         K = np.block([[hessian, A.T], [A, np.zeros((len(A), len(A)))]])
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
             # Rates of h: one for each request, and none of what is held to second order only.
@@ -166,10 +170,12 @@ def solve_posture(
             return Posture(stance.at(here.q), tangents, iteration)
         step = _solve(K, -np.concatenate([stationarity, errors]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
+        before = here
         here = here.at(
             pin.integrate(robot.model, here.q, length * step[: robot.model.nv]), check=False
         )
         multipliers = multipliers + length * step[robot.model.nv :]
+        multipliers = _carried(multipliers, before, here) if spread is None else None
     raise UnreachablePostureError(_what_remains(here, h, axes, list(joints), wanted))
 
 
@@ -194,12 +200,17 @@ def pull_back(stance: Stance, targets: Sequence[pin.SE3]) -> Stance:
     Raises:
         UnreachablePostureError: they cannot be brought there.
     """
-    here, model = stance, stance.robot.model
+    here, model, hanging = stance, stance.robot.model, list(stance.hanging)
     for _ in range(_MAX_ITERATIONS):
-        error = contact_error(here, targets)
+        error, rows = constraint_error(here, targets), here.constraints
+        if hanging:
+            swing = here.balance[hanging] / here.robot.weight
+            error = np.concatenate([error, swing])
+            rows = np.vstack([rows, here.hanging_derivative / here.robot.weight])
         if np.abs(error).max() < TOLERANCE / 10:
             return here.at(here.q)
-        step = -np.linalg.lstsq(here.jacobian, error, rcond=1e-9)[0]
+        rcond = 1e-9 if here.closures is None else CLOSURE_RANK
+        step = -np.linalg.lstsq(rows, error, rcond=rcond)[0]
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         here = here.at(pin.integrate(model, here.q, step), check=False)
     raise UnreachablePostureError(_what_remains(here, error, [], [], []))
@@ -214,6 +225,23 @@ def contact_error(stance: Stance, targets: Sequence[pin.SE3]) -> Float[np.ndarra
         else:
             errors.append(pin.log6(target.actInv(here)).vector[list(contact.components)])
     return np.concatenate(errors)
+
+
+def constraint_error(stance: Stance, targets: Sequence[pin.SE3]) -> Float[np.ndarray, " c"]:
+    """The same, then how far the robot's loops and couplings are open (c,)."""
+    error = contact_error(stance, targets)
+    if stance.closures is None:
+        return error
+    return np.concatenate([error, stance.closures.basis.T @ stance.closures.error])
+
+
+def _carried(multipliers: np.ndarray, before: Stance, after: Stance) -> np.ndarray:
+    """Multipliers of one iterate in the rows of the next: those of loops have a new basis."""
+    if before.closures is None or after.closures is None:
+        return multipliers
+    m, r = len(before.row_names), before.closures.basis.shape[1]
+    own = after.closures.basis.T @ (before.closures.basis @ multipliers[m : m + r])
+    return np.concatenate([multipliers[:m], own, multipliers[m + r :]])
 
 
 def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
@@ -298,6 +326,11 @@ def _what_remains(
         for c in stance.contacts
         for i in c.components
     ]
+    if stance.closures is not None:
+        open_ = "a loop or coupling of the robot remains {:.2e} m or rad open"
+        labels += [open_] * stance.closures.basis.shape[1]
+    names = stance.robot.velocity_names
+    labels += [f"{names[i]}, which hangs, lacks {{:.2e}} m of the weight" for i in stance.hanging]
     labels += [f"the CoM's {'xyz'[i]} remains {{:.2e}} m off" for i in axes]
     labels += [f"joint {joint} remains {{:.2e}} (rad or m) off" for joint in joints]
     worst = int(np.argmax(np.abs(h)))

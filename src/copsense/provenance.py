@@ -120,6 +120,9 @@ def model_digest(stance: Stance) -> str:
         found.update(_bytes([frame.placement.homogeneous]))
     limits = [model.lowerPositionLimit, model.upperPositionLimit, model.upperEffortLimit]
     found.update(_bytes([*limits, model.gravity.linear]))
+    drives = stance.robot.drives
+    if drives or stance.loads:
+        found.update(json.dumps(plain([drives, list(stance.loads)])).encode())
     return found.hexdigest()
 
 

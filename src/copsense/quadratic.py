@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +49,14 @@ class Quadratic:
     def has_wrench(self) -> bool:
         """Whether any wrench has a cost."""
         return bool(self.wrench.any() or self.pull.any())
+
+    def padded(self, more: int) -> Quadratic:
+        """The same where `more` forces without a cost stand behind the contacts' forces."""
+        if not more:
+            return self
+        return replace(
+            self, wrench=np.pad(self.wrench, (0, more)), pull=np.pad(self.pull, (0, more))
+        )
 
     def torque_weight(self, problem: LoadProblem) -> Float[np.ndarray, "n n"]:
         """W_tau = D + c M_j^-1.
@@ -104,28 +112,31 @@ class Quadratic:
     def compliance_derivative(
         self, stance: Stance, problem: LoadProblem, multipliers: Float[np.ndarray, " nv"]
     ) -> Float[np.ndarray, "a nv"]:
-        """d(P nu_j)/dq at fixed nu: zero unless the weight follows the inertia."""
-        nb = stance.robot.base_nv
+        """d(P nu_j)/dq at fixed nu: zero unless the weight follows the inertia.
+
+        Multipliers stand in the order of `Robot.by_drive`.
+        """
         if not self.inertia:
             return np.zeros((int(self.active.sum()), len(multipliers)))
+        nb = stance.robot.unactuated_nv
         # With S = D M + c 1: dP nu = (1 - P D) dM S^-1 nu.
         M = problem.joint_inertia
         S = self.torque @ M + self.inertia * np.eye(len(M))
         inner = np.zeros_like(multipliers)
         inner[nb:] = np.linalg.solve(S, multipliers[nb:])
-        change = stance.inertia_derivative(inner)[nb:]
+        change = _inertia_derivative(stance, inner)[nb:]
         return np.asarray(change - self.compliance(problem) @ (self.torque @ change))
 
     def torque_weight_derivative(
         self, stance: Stance, problem: LoadProblem, torques: Float[np.ndarray, " n"]
     ) -> Float[np.ndarray, "n nv"]:
         """d(W_tau tau)/dq at fixed tau: -c M^-1 dM M^-1 tau."""
-        nb, M = stance.robot.base_nv, problem.joint_inertia
+        nb, M = stance.robot.unactuated_nv, problem.joint_inertia
         if not self.inertia:
             return np.zeros((len(torques), nb + len(torques)))
         inner = np.zeros(nb + len(torques))
         inner[nb:] = np.linalg.solve(M, torques)
-        moved = stance.inertia_derivative(inner)[nb:]
+        moved = _inertia_derivative(stance, inner)[nb:]
         return np.asarray(-self.inertia * np.linalg.solve(M, moved))
 
     @cached_property
@@ -141,3 +152,11 @@ class Quadratic:
     def _constant_compliance(self) -> Float[np.ndarray, "a a"]:
         on = self.active
         return np.asarray(np.linalg.inv(self.torque[np.ix_(on, on)]))
+
+
+def _inertia_derivative(
+    stance: Stance, acceleration: Float[np.ndarray, " nv"]
+) -> Float[np.ndarray, "nv nv"]:
+    """d(M a)/dq, with a and the rows in the order of `Robot.by_drive`."""
+    robot = stance.robot
+    return robot.by_drive(stance.inertia_derivative(robot.from_drives(acceleration)))

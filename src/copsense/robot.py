@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -11,9 +11,11 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from copsense.arrays import array_property, finite_array, finite_number, read_only
 from copsense.description import Description, load_description, mjcf_file
+from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.parser_output import caught_parser_output
 
@@ -56,12 +58,14 @@ class Robot:
         description: where it came from, or None for a ready model.
         notes: what its description says and copsense does not use, a sentence each; every command
             prints them.
+        drives: which joints have motors, springs and couplings, and the loops among its links.
     """
 
     name: str
     model: pin.Model
     description: Description | None = None
     notes: tuple[str, ...] = ()
+    drives: Drives = field(default_factory=Drives)
 
     def __post_init__(self) -> None:
         """Reject a model that has no floating base, or whose masses make no sense."""
@@ -121,6 +125,23 @@ class Robot:
                 f"the model of robot {self.name!r} has gravity {model.gravity.linear}: without "
                 "weight there is nothing to share. Set model.gravity.linear, in m/s^2."
             )
+        self._check_drives()
+
+    def _check_drives(self) -> None:
+        """Reject drives of joints or frames that are not there, or of no single position."""
+        if not isinstance(self.drives, Drives):
+            raise InvalidInputError(
+                f"the drives of robot {self.name!r} are {self.drives!r}. Give copsense.Drives(...)."
+            )
+        assert self.actuation is None or len(self.torque_names) <= len(self.dof_names)
+        for coupling in self.drives.couplings:
+            self.velocity_index(coupling.joint)
+            self.velocity_index(coupling.of)
+        for joint in (*self.drives.springs, *self.drives.held):
+            self.velocity_index(joint)
+        for loop in self.drives.loops:
+            self.frame(loop.frame_a)
+            self.frame(loop.frame_b)
 
     @classmethod
     def from_urdf(
@@ -148,9 +169,55 @@ class Robot:
         return cls.from_description(description, name=name)
 
     @classmethod
-    def from_model(cls, model: pin.Model, *, name: str | None = None) -> Robot:
+    def from_model(
+        cls, model: pin.Model, *, name: str | None = None, drives: Drives | None = None
+    ) -> Robot:
         """Wrap a ready ``pin.Model`` (copied) whose first joint is a floating base."""
-        return cls(name or model.name or "robot", model.copy())
+        return cls(name or model.name or "robot", model.copy(), drives=drives or Drives())
+
+    def with_drives(self, drives: Drives) -> Robot:
+        """The same robot with other drives.
+
+        Raises:
+            UnknownNameError: a joint or frame is not in the model.
+        """
+        return replace(self, drives=drives)
+
+    def with_payload(
+        self,
+        frame: str,
+        mass: float,
+        *,
+        com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        inertia: ArrayLike | None = None,
+    ) -> Robot:
+        """The same robot with a mass fixed to a frame, which counts as its own from then on.
+
+        The centre of mass, the weight and the inertia are then those of robot and payload; for a
+        mass that is not to count as the robot's, hang its weight there (`copsense.Load`).
+
+        Args:
+            frame: name of the frame.
+            mass: of the payload [kg], not negative.
+            com: its centre of mass in the frame [m].
+            inertia: its inertia about that centre, frame axes (3, 3) [kg m^2]; default a point.
+
+        Raises:
+            UnknownNameError: no such frame.
+        """
+        at = self.frame(frame)
+        kg = finite_number(mass, f"the payload at {frame!r} [kg]")
+        if kg < 0:
+            raise InvalidInputError(f"the payload at {frame!r} is {mass} kg. Give it a mass.")
+        place = finite_array(com, f"the centre of mass of the payload at {frame!r}", (3,), "[m]")
+        about = np.zeros((3, 3))
+        if inertia is not None:
+            about = finite_array(inertia, f"the inertia of the payload at {frame!r}", (3, 3))
+        model = self.model.copy()
+        model.appendBodyToJoint(
+            at.parentJoint, pin.Inertia(kg, np.array(place), np.array(about)), at.placement
+        )
+        return replace(self, model=model)
 
     @classmethod
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
@@ -172,7 +239,7 @@ class Robot:
             self.joint_id(joint)
         locked = [i for i in range(2, self.model.njoints) if self.model.names[i] not in kept]
         reduced = pin.buildReducedModel(self.model, locked, pin.neutral(self.model))
-        return replace(self, model=reduced)
+        return replace(self, model=reduced, drives=self.drives.keeping(kept))
 
     @cached_property
     def mass(self) -> float:
@@ -195,19 +262,90 @@ class Robot:
         return tuple(self.model.names)[2:]
 
     @cached_property
+    def actuation(self) -> Actuation | None:
+        """Which joint torques the motors can exert; None where every joint has its own motor."""
+        return self.drives.on(self.dof_names)
+
+    @cached_property
+    def joint_forces(self) -> tuple[JointForce, ...]:
+        """Springs and held torques on the joints, in the order of the velocities."""
+        springs, held = self.drives.springs, self.drives.held
+        found = []
+        for joint in self.dof_names:
+            if joint in springs or joint in held:
+                model_joint = self.model.joints[self.joint_id(joint)]
+                spring = springs.get(joint, Spring(0.0))
+                found.append(
+                    JointForce(
+                        int(model_joint.idx_v),
+                        int(model_joint.idx_q),
+                        int(model_joint.nq),
+                        float(held.get(joint, 0.0)),
+                        float(spring.stiffness),
+                        float(spring.rest),
+                    )
+                )
+        return tuple(found)
+
+    @cached_property
     def torque_names(self) -> tuple[str, ...]:
-        """One label per entry of the torques: the joint, with an index where it has several."""
+        """One label per entry of the torques: the motor, named as its joint unless told else."""
+        return self.dof_names if self.actuation is None else self.actuation.motors
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """One label per degree of freedom behind the base: the joint, with an index if several."""
         labels: list[str] = []
         for joint, name in zip(list(self.model.joints)[2:], self.joint_names, strict=True):
             labels += [name] if joint.nv == 1 else [f"{name}[{i}]" for i in range(joint.nv)]
         return tuple(labels)
 
     @cached_property
+    def unactuated_nv(self) -> int:
+        """How many rows of the balance no motor takes part in: the base's, and joints without."""
+        return self.base_nv + (0 if self.actuation is None else len(self.actuation.free))
+
+    def by_drive(self, rows: Float[np.ndarray, "nv *p"]) -> Float[np.ndarray, "nv *p"]:
+        """Rows of the balance (nv, ...), those that no motor feels first, then one per motor.
+
+        With N = J' f + S t_m the last rows of ``by_drive(N - J' f)`` are t_m, the first are zero.
+        """
+        if self.actuation is None:
+            return rows
+        joints = rows[self.base_nv :]
+        parts = rows[: self.base_nv], self.actuation.free @ joints, self.actuation.inverse @ joints
+        return np.concatenate(parts)
+
+    def from_drives(self, multipliers: Float[np.ndarray, "nv *p"]) -> Float[np.ndarray, "nv *p"]:
+        """The transpose of `by_drive`: multipliers of its rows as velocities (nv, ...)."""
+        if self.actuation is None:
+            return multipliers
+        nb, free = self.base_nv, self.unactuated_nv
+        joints = self.actuation.free.T @ multipliers[nb:free]
+        joints = joints + self.actuation.inverse.T @ multipliers[free:]
+        return np.concatenate([multipliers[:nb], joints])
+
+    def in_drives(self, velocities: Float[np.ndarray, "nv *p"]) -> Float[np.ndarray, "nv *p"]:
+        """The inverse of `from_drives`: what of velocities (nv, ...) each row of the balance sees.
+
+        The last rows are the speeds of the motors.
+        """
+        if self.actuation is None:
+            return velocities
+        joints = velocities[self.base_nv :]
+        parts = velocities[: self.base_nv], self.actuation.free @ joints
+        return np.concatenate([*parts, self.actuation.matrix.T @ joints])
+
+    def joint_torques(self, torques: Float[np.ndarray, "k *p"]) -> Float[np.ndarray, "n *p"]:
+        """Torques on the joints (n, ...) of motor torques (k, ...): S t_m."""
+        return torques if self.actuation is None else self.actuation.matrix @ torques
+
+    @cached_property
     def velocity_names(self) -> tuple[str, ...]:
         """One label per entry of a velocity: the base in its own frame, then the joints."""
         six = ("base_vx", "base_vy", "base_vz", "base_wx", "base_wy", "base_wz")
         base = six if self.base_nv == 6 else ("base_vx", "base_vy", "base_w")
-        return base + self.torque_names
+        return base + self.dof_names
 
     @cached_property
     def frame_names(self) -> tuple[str, ...]:
@@ -216,13 +354,13 @@ class Robot:
 
     @cached_property
     def position_limits(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Lowest and highest position of each entry of the torques (n,) [rad, m].
+        """Lowest and highest position of each degree of freedom behind the base (n,) [rad, m].
 
         Infinite where the model has no limit: a joint that turns without end, one of several
         degrees of freedom, or one whose lower limit is not below its upper one.
         """
-        lower = np.full(len(self.torque_names), -np.inf)
-        upper = np.full(len(self.torque_names), np.inf)
+        lower = np.full(len(self.dof_names), -np.inf)
+        upper = np.full(len(self.dof_names), np.inf)
         at, q = self.single_joints
         low, high = self.model.lowerPositionLimit[q], self.model.upperPositionLimit[q]
         lower[at] = np.where((low < high) & (low > -_NO_POSITION), low, -np.inf)
@@ -231,16 +369,22 @@ class Robot:
 
     @array_property
     def effort_limits(self) -> Float[np.ndarray, " n"]:
-        """The model's effort limit of each entry of the torques (n,) [Nm, or N].
+        """The model's effort limit of each motor (k,) [Nm, or N].
 
         Infinite where the model gives a placeholder: none, zero, or `PLACEHOLDER_EFFORT` and more.
         """
         effort = np.asarray(self.model.upperEffortLimit)[self.base_nv :]
+        if self.actuation is not None:
+            known = dict(zip(self.dof_names, effort, strict=True))
+            for each in self.drives.transmissions:
+                limits = each.effort_limits or (np.inf,) * len(each.motors)
+                known |= dict(zip(each.motors, limits, strict=True))
+            effort = np.array([known[motor] for motor in self.torque_names])
         return np.where((effort > 0) & (effort < PLACEHOLDER_EFFORT), effort, np.inf)
 
     @cached_property
     def single_joints(self) -> tuple[Int[np.ndarray, " s"], Int[np.ndarray, " s"]]:
-        """Joints whose position is one number: their entries of the torques, and of q."""
+        """Joints whose position is one number: their degree of freedom, and their entry of q."""
         single = [joint for joint in list(self.model.joints)[2:] if joint.nq == 1]
         torque = np.array([joint.idx_v - self.base_nv for joint in single], dtype=int)
         position = np.array([joint.idx_q for joint in single], dtype=int)
@@ -263,8 +407,8 @@ class Robot:
         return int(model_joint.idx_v)
 
     @cached_property
-    def torque_units(self) -> tuple[str, ...]:
-        """Unit of the position behind each torque: ``"rad"``, or ``"m"`` if it slides."""
+    def dof_units(self) -> tuple[str, ...]:
+        """Unit of each degree of freedom behind the base: ``"rad"``, or ``"m"`` if it slides."""
         units: list[str] = []
         for joint in list(self.model.joints)[2:]:
             kind = joint.shortname().removeprefix("JointModel")
@@ -273,7 +417,7 @@ class Robot:
 
     def joint_unit(self, joint: str) -> Literal["rad", "m"]:
         """Unit of a one-degree-of-freedom joint's position: ``"rad"``, or ``"m"`` if it slides."""
-        unit = self.torque_units[self.velocity_index(joint) - self.base_nv]
+        unit = self.dof_units[self.velocity_index(joint) - self.base_nv]
         return "m" if unit == "m" else "rad"
 
     def joint_position(self, q: Float[np.ndarray, " nq"], joint: str) -> float:
@@ -364,7 +508,34 @@ class Robot:
 
     def __repr__(self) -> str:
         """Name, joints and mass."""
-        return f"Robot({self.name!r}, {len(self.torque_names)} joints, {self.mass:.4g} kg)"
+        return f"Robot({self.name!r}, {len(self.dof_names)} joints, {self.mass:.4g} kg)"
+
+
+@dataclass(frozen=True)
+class JointForce:
+    """A spring and a held torque on one joint: torque - stiffness (q - rest).
+
+    Attributes:
+        velocity: where the joint stands in a velocity.
+        position: where it stands in a configuration.
+        size: its numbers there; 2 for a joint that turns without end (cosine, sine).
+        torque: held [Nm, or N].
+        stiffness: [Nm/rad, or N/m].
+        rest: [rad, or m].
+    """
+
+    velocity: int
+    position: int
+    size: int
+    torque: float
+    stiffness: float
+    rest: float
+
+    def force(self, q: Float[np.ndarray, " nq"]) -> float:
+        """The torque on the joint at a configuration [Nm, or N]."""
+        here = q[self.position : self.position + self.size]
+        now = float(here[0] if self.size == 1 else np.arctan2(here[1], here[0]))
+        return self.torque - self.stiffness * (now - self.rest)
 
 
 def build_model(description: Description) -> pin.Model:

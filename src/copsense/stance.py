@@ -16,13 +16,17 @@ from scipy.linalg import lapack
 
 from copsense import rigid_body
 from copsense.arrays import array_property, read_only
+from copsense.closures import RANK as CLOSURE_RANK
+from copsense.closures import Closures
 from copsense.contact import COMPONENT_NAMES, Contact, Plane
 from copsense.errors import (
     ContactGeometryError,
     InsufficientContactsError,
     InvalidInputError,
+    OpenLoopError,
     UnknownNameError,
 )
+from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads, turning
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
@@ -50,10 +54,14 @@ class Stance:
     contact, its components among (fx, fy, fz, mx, my, mz) in contact axes. Columns are Pinocchio's
     velocity: the base in its own frame, then the joints. Arrays are read-only.
 
+    A robot with loops or couplings has forces of its own as well, which keep these closed. They
+    stand behind the contacts' forces, (c,), wherever all of them are meant.
+
     Attributes:
         robot: the robot.
         q: configuration (nq,): base position, quaternion (x, y, z, w), joints.
         contacts: the contacts, at least one; kept as a tuple.
+        loads: known forces on the robot beside its weight; kept as a tuple.
         check: False skips the checks of where the contacts lie and of what they can carry, for
             a solver's intermediate steps.
 
@@ -62,12 +70,14 @@ class Stance:
         UnknownNameError: a contact's frame is not in the model.
         ContactGeometryError: a contact does not lie on its stated plane.
         InsufficientContactsError: the contacts cannot balance every force and moment on the base.
+        OpenLoopError: a loop or coupling of the robot is open at this configuration.
     """
 
     robot: Robot
     q: Float[np.ndarray, " nq"]
     contacts: Sequence[Contact]
     check: InitVar[bool] = True
+    loads: Sequence[AnyLoad] = ()
     _layout: _Layout = field(init=False)
     # World placement of the contact frames as the foot carries them, and their local Jacobians.
     _feet: tuple[pin.SE3, ...] = field(init=False)
@@ -81,6 +91,7 @@ class Stance:
         feet, local = rigid_body.place(self.robot, q, layout.attachments)
         for name, value in (
             ("contacts", contacts),
+            ("loads", _known_loads(self.loads)),
             ("q", q),
             ("_layout", layout),
             ("_feet", feet),
@@ -91,6 +102,8 @@ class Stance:
             for k, contact in enumerate(contacts):
                 _check_plane(contact, feet[k])
             check_support(self)
+            if self.closures is not None:
+                _check_closed(self.closures)
 
     @classmethod
     def from_model(
@@ -127,11 +140,15 @@ class Stance:
 
     def at(self, q: ArrayLike, *, check: bool = True) -> Stance:
         """The same stance at another configuration."""
-        return Stance(self.robot, q, self.contacts, check)  # type: ignore[arg-type]
+        return Stance(self.robot, q, self.contacts, check, self.loads)  # type: ignore[arg-type]
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
-        """The same robot and configuration on other contacts."""
-        return Stance(self.robot, self.q, tuple(contacts))
+        """The same robot, configuration and loads on other contacts."""
+        return Stance(self.robot, self.q, tuple(contacts), loads=self.loads)
+
+    def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
+        """The same robot, configuration and contacts under other loads."""
+        return Stance(self.robot, self.q, self.contacts, loads=tuple(loads))
 
     @property
     def contact_names(self) -> tuple[str, ...]:
@@ -163,13 +180,49 @@ class Stance:
 
     @array_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
-        """Generalised gravity G(q) [N, Nm]: what the torques and contacts must balance."""
+        """Generalised gravity G(q) [N, Nm]."""
         return rigid_body.gravity(self.robot, self.q)
+
+    @array_property
+    def balance(self) -> Float[np.ndarray, " nv"]:
+        """N(q) [N, Nm], what motors, contacts and loops must balance.
+
+        Gravity less the loads, the springs of the joints and the torques held on them.
+        """
+        if not self.loads and not self.robot.joint_forces:
+            return self.gravity
+        found = np.array(self.gravity)
+        if self.applied is not None:
+            found -= self.applied.balanced
+        for joint in self.robot.joint_forces:
+            found[joint.velocity] -= joint.force(self.q)
+        return found
+
+    @cached_property
+    def applied(self) -> AppliedLoads | None:
+        """What the loads do at this configuration; None where there are none."""
+        return apply_loads(self.loads, self.robot, self.q) if self.loads else None
+
+    @cached_property
+    def closures(self) -> Closures | None:
+        """The robot's loops and couplings at this configuration; None where it has none."""
+        drives = self.robot.drives
+        return Closures(self.robot, self.q) if drives.loops or drives.couplings else None
 
     @array_property
     def jacobian(self) -> Float[np.ndarray, "m nv"]:
         """Stacked contact Jacobian J: velocities of the contact frames, in contact axes."""
         return self._stacked(self._local)
+
+    @property
+    def constraints(self) -> Float[np.ndarray, "c nv"]:
+        """J over the independent rows of loops and couplings: what may not move, (c, nv)."""
+        return self.jacobian if self.closures is None else self._constraints
+
+    @array_property
+    def _constraints(self) -> Float[np.ndarray, "c nv"]:
+        assert self.closures is not None
+        return np.concatenate([self.jacobian, self.closures.independent])
 
     @array_property
     def com(self) -> Float[np.ndarray, " 3"]:
@@ -192,7 +245,7 @@ class Stance:
 
         Nothing here keeps a posture within them: this says where one is not.
         """
-        (lower, upper), excess = self.robot.position_limits, np.zeros(len(self.robot.torque_names))
+        (lower, upper), excess = self.robot.position_limits, np.zeros(len(self.robot.dof_names))
         at, q = self.robot.single_joints
         beyond = np.maximum(lower[at] - self.q[q], self.q[q] - upper[at])
         excess[at] = np.maximum(beyond, 0.0)
@@ -216,26 +269,53 @@ class Stance:
 
     @cached_property
     def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        u, s, vt = np.linalg.svd(self.jacobian, full_matrices=True)
+        u, s, vt = np.linalg.svd(self.constraints, full_matrices=True)
         return u, s, vt
 
     @cached_property
+    def hanging(self) -> tuple[int, ...]:
+        """Velocities of joints that neither motor, contact nor loop holds: they hang.
+
+        Only gravity, loads, springs and held torques act on them, which `balance` must be zero of.
+        """
+        robot = self.robot
+        if robot.actuation is None:
+            return ()
+        idle = ~(
+            robot.actuation.matrix.any(axis=1) | self.constraints[:, robot.base_nv :].any(axis=0)
+        )
+        return tuple(int(i) + robot.base_nv for i in np.flatnonzero(idle))
+
+    @array_property
+    def hanging_derivative(self) -> Float[np.ndarray, "h nv"]:
+        """d balance/dq of the joints that hang (h, nv): a motion must leave them at rest."""
+        still = np.zeros(len(self.constraints))
+        return self.balance_derivative(still)[list(self.hanging)]
+
+    @cached_property
     def rank(self) -> int:
-        """Rank of the contact Jacobian; less than its rows when contacts are redundant."""
+        """Rank of `constraints`; less than its rows when contacts are redundant."""
         singular = self._svd[1]
-        return int(np.sum(singular > RANK_TOLERANCE * max(1.0, singular[0])))
+        tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
+        return int(np.sum(singular > tolerance * max(1.0, singular[0])))
 
     @array_property
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
-        """Orthonormal basis Z of the velocities that leave the contacts at rest: J Z = 0.
+        """Orthonormal basis Z of the velocities that move no contact and open no loop: J Z = 0.
 
-        Without the `false_motions`, which J alone would allow.
+        Without the `false_motions`, which J alone would allow. Joints that hang follow as gravity
+        and their springs tell them.
         """
         Z = self._svd[2][self.rank :].T.copy()
-        if not self.false_motions.shape[1]:
-            return Z
         count = self.false_motions.shape[1]
-        return np.asarray(Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T)
+        if count:
+            Z = Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T
+        if not self.hanging:
+            return Z
+        rows = self.hanging_derivative @ Z
+        _, s, vt = np.linalg.svd(rows)
+        lost = int(np.sum(s > CLOSURE_RANK * max(s.max(initial=0.0), self.robot.weight * 1e-3)))
+        return np.asarray(Z @ vt[lost:].T)
 
     @array_property
     def false_motions(self) -> Float[np.ndarray, "nv k"]:
@@ -262,14 +342,14 @@ class Stance:
         Z = vt[self.rank :].T
         motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
         for y in u[:, self.rank :].T:
-            turned = -self.balance_derivative(y, np.zeros(3))  # d(J' y)/dq
+            turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
             values, vectors = np.linalg.eigh(Z.T @ (turned + turned.T) @ Z / 2)
             curved = np.abs(values) > _CURVED
             if curved.any() and (np.all(values[curved] > 0) or np.all(values[curved] < 0)):
                 false = Z @ vectors[:, curved]
                 motions.append(false)
                 rows.append(false.T @ turned)
-                errors.append(false.T @ self.jacobian.T @ y)
+                errors.append(false.T @ self.constraints.T @ y)
         left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
         return left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
 
@@ -312,7 +392,7 @@ class Stance:
     @property
     def redundant_directions(self) -> tuple[str, ...]:
         """Rows of stacked forces that take part in wrenches no motion can feel (J' f = 0)."""
-        null = self._svd[0][:, self.rank :]
+        null = self._svd[0][: len(self.row_names), self.rank :]
         share = np.linalg.norm(null, axis=1)
         return tuple(n for n, s in zip(self.row_names, share, strict=True) if s > 1e-6)
 
@@ -322,7 +402,11 @@ class Stance:
         return wrenches.reshape(6 * len(self.contacts), *wrenches.shape[2:])[self._layout.places]
 
     def unstack(self, forces: Float[np.ndarray, "m *p"]) -> Float[np.ndarray, "nc 6 *p"]:
-        """Stacked forces (m, ...) as wrenches (nc, 6, ...), zero where a contact carries none."""
+        """Stacked forces (m, ...) as wrenches (nc, 6, ...), zero where a contact carries none.
+
+        Forces of loops behind them are left out.
+        """
+        forces = forces[: len(self._layout.row_names)]
         shape = (len(self.contacts), 6, *forces.shape[1:])
         if len(forces) == shape[0] * 6:
             return np.array(forces).reshape(shape)
@@ -338,9 +422,21 @@ class Stance:
         ]
         return np.array(turned)
 
+    def loop_forces(self, forces: Float[np.ndarray, " c"]) -> Float[np.ndarray, " l"]:
+        """The part of stacked forces that keeps loops and couplings closed, row by row (l,).
+
+        Rows as `Closures.names`. Where rows depend on each other it is the smallest of the sets
+        of forces that do the same.
+        """
+        if self.closures is None:
+            return np.zeros(0)
+        return np.asarray(self.closures.basis @ forces[len(self.row_names) :])
+
     def joint_wrenches(self, forces: Float[np.ndarray, " m"]) -> dict[int, pin.Force]:
         """Stacked forces as spatial forces: joint of the model -> force in the joint's frame."""
         external: dict[int, pin.Force] = {}
+        if self.closures is not None and len(forces) > len(self.row_names):
+            external = self.closures.forces(self.loop_forces(forces))
         wrenches = self.unstack(forces)
         for k, (joint, placement) in enumerate(self._layout.attachments):
             wrench = wrenches[k]
@@ -350,33 +446,66 @@ class Stance:
             external[joint] = external[joint] + force if joint in external else force
         return external
 
-    def balance_derivative(
-        self,
-        forces: Float[np.ndarray, " m"],
-        gravity: Float[np.ndarray, " 3"] | None = None,
-    ) -> Float[np.ndarray, "nv nv"]:
-        """A = d(G - J' f)/dq at fixed f in contact axes, along velocities of the model.
+    def spatial_forces(self, forces: Float[np.ndarray, " c"]) -> dict[int, pin.Force]:
+        """Stacked forces and the loads as spatial forces, as `joint_wrenches`."""
+        found = self.joint_wrenches(forces)
+        for joint, force in self.applied.forces.items() if self.applied else ():
+            found[joint] = found[joint] + force if joint in found else force
+        return found
+
+    def joint_loads(self, forces: Float[np.ndarray, " c"]) -> Float[np.ndarray, " nv"]:
+        """Springs, held torques and couplings: what acts between joints (nv,) [Nm, or N]."""
+        found = np.zeros(self.robot.model.nv)
+        for joint in self.robot.joint_forces:
+            found[joint.velocity] += joint.force(self.q)
+        count = len(self.robot.drives.couplings)
+        if self.closures is not None and count:
+            lam = self.loop_forces(forces)
+            found += self.closures.jacobian[-count:].T @ lam[-count:]
+        return found
+
+    def balance_derivative(self, forces: Float[np.ndarray, " c"]) -> Float[np.ndarray, "nv nv"]:
+        """A = d(N - J' f)/dq at fixed f in contact axes, along velocities of the model.
 
         Args:
-            forces: stacked forces f (m,).
-            gravity: another gravity than the model's (3,) [m/s^2], for the curvature of a centre
-                of mass rather than of the weight.
+            forces: stacked forces f (c,).
 
         Exact along admissible motions; for surface contacts everywhere.
         """
-        derivative = rigid_body.static_torque_derivative(
-            self.robot, self.q, self.joint_wrenches(forces), gravity
-        )
+        return self._balance_derivative(forces, None)
+
+    def curvature(
+        self, forces: Float[np.ndarray, " c"], gravity: Float[np.ndarray, " 3"]
+    ) -> Float[np.ndarray, "nv nv"]:
+        """d(G - J' f)/dq without loads and springs, under a gravity of its own (3,) [m/s^2].
+
+        The second derivative of sums of the constraints and of the CoM's coordinates.
+        """
+        return self._balance_derivative(forces, gravity)
+
+    def _balance_derivative(
+        self, forces: Float[np.ndarray, " c"], gravity: Float[np.ndarray, " 3"] | None
+    ) -> Float[np.ndarray, "nv nv"]:
+        applied = self.applied if gravity is None else None
+        external = self.spatial_forces(forces) if gravity is None else self.joint_wrenches(forces)
+        derivative = rigid_body.static_torque_derivative(self.robot, self.q, external, gravity)
+        if applied is not None:
+            derivative += applied.derivative
+        if gravity is None:
+            for joint in self.robot.joint_forces:
+                derivative[joint.velocity, joint.velocity] += joint.stiffness
+        if self.closures is not None and len(forces) > len(self.row_names):
+            derivative -= self.closures.turning(self.loop_forces(forces))
         # Pinocchio turns the force with its joint. A surface does not turn; a point foot does, and
         # its force stays fixed in the world: J_l' [f]x J_a is what that takes away.
         for k, rows in enumerate(self.rows):
             if self._layout.fixed_axes[k] is not None:
-                local, force = self._local[k], self._turn(k).T @ forces[rows]
-                derivative -= local[:3].T @ pin.skew(force) @ local[3:]
+                own = np.concatenate([self._turn(k).T @ forces[rows], np.zeros(3)])
+                derivative -= turning(self._local[k], own)
         return derivative
 
-    def motion_derivative(self, velocity: Float[np.ndarray, " nv"]) -> Float[np.ndarray, "m nv"]:
-        """D = d(J v)/dq at fixed v, along velocities of the model."""
+    def motion_derivative(self, velocity: Float[np.ndarray, " nv"]) -> Float[np.ndarray, "c nv"]:
+        """D = d(J v)/dq of `constraints` at fixed v, along velocities of the model."""
         derivatives = rigid_body.velocity_derivatives(
             self.robot, self.q, velocity, self._layout.attachments
         )
@@ -384,7 +513,11 @@ class Stance:
             if axes is not None:
                 local = self._local[k]
                 derivatives[k, :3] -= pin.skew(local[:3] @ velocity) @ local[3:]
-        return self._stacked(derivatives)
+        found = self._stacked(derivatives)
+        if self.closures is None:
+            return found
+        own = self.closures.basis.T @ self.closures.motion_derivative(velocity)
+        return np.concatenate([found, own])
 
     def inertia_derivative(
         self, acceleration: Float[np.ndarray, " nv"]
@@ -487,6 +620,28 @@ def _check_plane(contact: Contact, foot: pin.SE3) -> None:
             + ("" if contact.kind == "point" else f" and its z axis {degrees:.3f} deg away")
             + ". Move the base or the joints (copsense.solve_posture places the feet), "
             "correct the contact's offset or rotation, or drop its plane."
+        )
+
+
+def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:
+    given = (loads,) if isinstance(loads, Load | SpringLoad) else tuple(loads)
+    for load in given:
+        if not isinstance(load, Load | SpringLoad):
+            raise InvalidInputError(
+                f"{load!r} is not a load. Give copsense.Load(frame, force) or SpringLoad(...)."
+            )
+    return given
+
+
+def _check_closed(closures: Closures) -> None:
+    """Reject a configuration that leaves a loop or coupling open."""
+    error = np.abs(closures.error)
+    worst = int(error.argmax())
+    if error[worst] > POSITION_TOLERANCE:
+        raise OpenLoopError(
+            f"{closures.names[worst]} of robot {closures.robot.name!r} is open by "
+            f"{error[worst]:.3g} (m or rad). copsense.load_stance and solve_posture close loops "
+            "and couplings; give a configuration in which they are closed."
         )
 
 

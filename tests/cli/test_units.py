@@ -74,7 +74,7 @@ STAND = ("--contact", "base", "--sole", "-0.5:0.5:-0.5:0.5")
 
 def test_the_unit_of_a_position_is_that_of_its_joint(elevator):
     robot = Robot.from_urdf(elevator)
-    assert robot.torque_units == ("m", "rad")
+    assert robot.dof_units == ("m", "rad")
     assert read_positions(("slide=0.1", "turn=20"), robot) == {
         "slide": 0.1,
         "turn": math.radians(20),
@@ -93,7 +93,7 @@ def test_joints_of_several_coordinates_have_a_unit_for_each():
     model.addJoint(base, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
     model.addJoint(base, pin.JointModelPrismaticUnaligned(1, 1, 0), pin.SE3.Identity(), "rail")
     robot = Robot.from_model(model)
-    assert robot.torque_units == ("m", "m", "rad", "rad", "rad", "rad", "m")
+    assert robot.dof_units == ("m", "m", "rad", "rad", "rad", "rad", "m")
     assert robot.joint_unit("rail") == "m"
 
 

@@ -19,9 +19,9 @@ from copsense.regions import (
     BOX,
     FINEST,
     ComRegion,
+    balance_at,
     com_region,
     criterion_region,
-    gravity_at,
 )
 
 TOLERANCE = 1e-5  # m, of the regions here
@@ -102,12 +102,12 @@ def shifted(stance, com):
 @pytest.mark.parametrize("name", [*GROUNDED, "four_bar"])
 def test_gravity_elsewhere_is_that_of_a_load_shifted_on_the_base(grounded, stance_of, name):
     stance = stance_of(name) if name == "four_bar" else grounded(name)[0]
-    np.testing.assert_array_equal(gravity_at(stance, stance.com[:2]), stance.gravity)
+    np.testing.assert_array_equal(balance_at(stance, stance.com[:2]), stance.gravity)
     x = 0.0 if name == "four_bar" else 0.07
     for step in ((x, 0.0), (0.0, -0.03), (x, 0.11)):
         com = stance.com[:2] + step
         np.testing.assert_allclose(
-            gravity_at(stance, com),
+            balance_at(stance, com),
             shifted(stance, com).gravity,
             rtol=0,
             atol=1e-12 * stance.robot.weight,

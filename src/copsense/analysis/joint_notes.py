@@ -15,7 +15,7 @@ def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
     return tuple(
         f"{joint} is {distance_text(excess, unit)} beyond its limit."
         for joint, unit, excess in zip(
-            robot.torque_names, robot.torque_units, stance.joint_limit_excess.tolist(), strict=True
+            robot.dof_names, robot.dof_units, stance.joint_limit_excess.tolist(), strict=True
         )
         if excess > ROUNDING
     )

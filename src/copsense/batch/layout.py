@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from copsense.contact import Contact
 from copsense.robot import Robot
 from copsense.stance import Stance
 
@@ -109,9 +108,13 @@ class RobotLayout:
         return self.tree, self.feet
 
 
-def why_not_covered(robot: Robot, contacts: tuple[Contact, ...]) -> str:
-    """Why the kernel does not serve this robot on these contacts; empty where it does."""
-    model = robot.model
+def why_not_covered(stance: Stance) -> str:
+    """Why the kernel does not serve a robot on its contacts; empty where it does."""
+    robot, contacts, model = stance.robot, tuple(stance.contacts), stance.robot.model
+    if stance.loads:
+        return "there are loads beside the weight"
+    if robot.drives:
+        return "some joints have no motor of their own, or springs, couplings or loops"
     if model.joints[1].shortname() != "JointModelFreeFlyer":
         return "the base moves in a plane"
     for joint, name in zip(list(model.joints)[2:], robot.joint_names, strict=True):

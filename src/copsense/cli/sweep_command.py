@@ -152,7 +152,7 @@ def _note_joints(swept: Sweep, robot: Robot) -> None:
     """Say which joints are beyond their limits on the way."""
     from copsense.analysis.joint_notes import ROUNDING, distance_text
 
-    units = dict(zip(robot.torque_names, robot.torque_units, strict=True))
+    units = dict(zip(robot.dof_names, robot.dof_units, strict=True))
     for name in swept.labels("joint"):
         excess = swept["joint_limit_excess"].sel(joint=name)
         count, most = int((excess > ROUNDING).sum()), float(excess.max())

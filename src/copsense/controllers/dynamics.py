@@ -36,6 +36,13 @@ class StandingDynamics:
                 f"robot {robot.name!r} lives in a plane: a momentum-based controller is spatial. "
                 "Use a robot with a free-floating base."
             )
+        if robot.drives or stance.loads:
+            raise InvalidInputError(
+                f"robot {robot.name!r} has joints without a motor of their own, springs, loops, or "
+                "loads on it: a momentum-based controller here knows motors, contacts and weight "
+                "alone. Analyse it at rest, or control it without them: stance.with_loads(()), "
+                "robot.with_drives(Drives())."
+            )
         self.model: pin.Model = robot.model
         self.data: pin.Data = robot.model.createData()
         self.mass: float = robot.mass

@@ -31,15 +31,15 @@ from copsense.regions.feasible_region import FINEST, com_region
 from copsense.regions.nested_regions import ComRegions, com_regions
 from copsense.regions.region import BOX, ComRegion
 from copsense.regions.unclipped_region import criterion_region
-from copsense.regions.weight_line import gravity_at
+from copsense.regions.weight_line import balance_at
 
 __all__ = [
     "BOX",
     "FINEST",
     "ComRegion",
     "ComRegions",
+    "balance_at",
     "com_region",
     "com_regions",
     "criterion_region",
-    "gravity_at",
 ]

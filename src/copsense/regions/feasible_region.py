@@ -66,12 +66,15 @@ class _Problem:
     """
 
     def __init__(self, stance: Stance, limits: Limits, axes: Float[np.ndarray, "2 r"]) -> None:
-        nb, weight, r = stance.robot.base_nv, stance.robot.weight, axes.shape[1]
+        robot, r = stance.robot, axes.shape[1]
+        nb, weight, load = robot.base_nv, robot.weight, LoadProblem.of(stance)
         all_rows = limit_rows(stance, limits)
-        rows, bound = all_rows.over_forces(LoadProblem.of(stance))
+        rows, bound = all_rows.over_forces(load)
         self.names = all_rows.all_names
-        E = np.hstack([stance.jacobian[:, :nb].T, -gravity_slope(stance) @ axes / weight])
-        self.x0 = np.linalg.lstsq(E, stance.gravity[:nb] / weight, rcond=None)[0]
+        slope = np.zeros((len(load.base_wrench), r))  # joints without a motor feel no change
+        slope[:nb] = gravity_slope(stance) @ axes / weight
+        E = np.hstack([load.base_map, -slope])
+        self.x0 = np.linalg.lstsq(E, load.base_wrench / weight, rcond=None)[0]
         self.N = scipy.linalg.null_space(E)
         self.c0, self.axes, self.weight = stance.com[:2], axes, weight
         box = np.hstack([np.zeros((r, E.shape[1] - r)), np.eye(r)])

@@ -14,7 +14,7 @@ from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
 from copsense.regions.refinement import Point
 from copsense.regions.region import BOX, ComRegion, region_between
-from copsense.regions.weight_line import com_axes, gravity_at
+from copsense.regions.weight_line import balance_at, com_axes
 from copsense.sensitivity import cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import WrenchPolicy, share_load
@@ -60,6 +60,8 @@ def criterion_region(
     rows = limit_rows(stance, limits)
     joint, s = rows.joint, rows.sign
     # A f <= b and s tau <= t with f = f0 + F z and tau = tau0 + T z, c = c0 + axes z.
+    m = rows.matrix.shape[1]  # the contacts' forces, without those of loops behind them
+    f0, F = f0[:m], F[:m]
     normals = np.vstack([rows.matrix @ F, s[:, None] * T[joint]])
     offsets = np.concatenate([rows.bound - rows.matrix @ f0, rows.torque[joint] - s * tau0[joint]])
     unit = np.concatenate([np.linalg.norm(rows.matrix, axis=1), np.ones(len(joint))])
@@ -88,11 +90,11 @@ def _held_equilibrium(
             "elsewhere at this posture. Give a Criterion, or moving=True."
         )
 
-    own, nb = LoadProblem.of(stance), stance.robot.base_nv
+    own, nb = LoadProblem.of(stance), stance.robot.unactuated_nv
 
     def share(step: Point) -> tuple[np.ndarray, np.ndarray]:
         # The weight at another point, shared at this posture.
-        wrench = gravity_at(stance, stance.com[:2] + step)[:nb]
+        wrench = stance.robot.by_drive(balance_at(stance, stance.com[:2] + step))[:nb]
         return share_load(stance, criterion, replace(own, base_wrench=wrench))
 
     # A metre along each axis gives the slopes without rounding to speak of.

@@ -13,22 +13,22 @@ from copsense.stance import Stance
 _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 
 
-def gravity_at(stance: Stance, com: ArrayLike) -> Float[np.ndarray, " nv"]:
-    """Generalised gravity with the weight's line of action through another point, posture held.
+def balance_at(stance: Stance, com: ArrayLike) -> Float[np.ndarray, " nv"]:
+    """The balance with the weight's line of action through another point, posture and loads held.
 
     Args:
         stance: robot, posture and contacts.
         com: (2,) world x, y [m] of the centre of mass.
 
     Returns:
-        The vector G (nv,) in N and Nm. The base's rows, in the base's frame, are those of the
-        weight at `com`; the joints' rows are the stance's. It equals ``stance.gravity`` at
+        The vector N (nv,) in N and Nm. The base's rows, in the base's frame, are those of the
+        weight at `com`; the joints' rows are the stance's. It equals ``stance.balance`` at
         ``stance.com[:2]``.
     """
     point = finite_array(com, "the centre of mass", (2,), "world x, y [m]")
-    gravity = np.array(stance.gravity)
-    gravity[: stance.robot.base_nv] += gravity_slope(stance) @ (point - stance.com[:2])
-    return gravity
+    balance = np.array(stance.balance)
+    balance[: stance.robot.base_nv] += gravity_slope(stance) @ (point - stance.com[:2])
+    return balance
 
 
 def gravity_slope(stance: Stance) -> Float[np.ndarray, "nb 2"]:

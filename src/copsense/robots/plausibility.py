@@ -85,13 +85,13 @@ def _size_notes(stance: Stance) -> list[str]:
 
 def _joint_notes(stance: Stance) -> list[str]:
     robot, excess = stance.robot, stance.joint_limit_excess
-    slides = np.array([unit == "m" for unit in robot.torque_units], dtype=bool)
+    slides = np.array([unit == "m" for unit in robot.dof_units], dtype=bool)
     far = excess > np.where(slides, _FAR_SLID, _FAR_BEYOND)
     if not far.any():
         return []
     order = [i for i in np.argsort(-excess) if far[i]]
     named = ", ".join(
-        f"{robot.torque_names[i]} by "
+        f"{robot.dof_names[i]} by "
         + (f"{excess[i] * 1e3:.0f} mm" if slides[i] else f"{np.degrees(excess[i]):.0f} deg")
         for i in order[:_NAMED]
     )

@@ -234,7 +234,7 @@ def _inside(robot: Robot) -> dict[str, float]:
     """Joint -> a position inside its range, for joints whose range leaves zero out [rad, m]."""
     lower, upper = robot.position_limits
     inside = {}
-    for name, low, high in zip(robot.torque_names, lower.tolist(), upper.tolist(), strict=True):
+    for name, low, high in zip(robot.dof_names, lower.tolist(), upper.tolist(), strict=True):
         if low > 0.0 or high < 0.0:
             near, far = (low, high) if low > 0.0 else (high, low)
             # A quarter of the range in; where it has no other end, or begins at once, its end.

@@ -35,6 +35,12 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
             f"robot {robot.name!r} moves in a plane, the simulation in space. Use a robot with a "
             "free-floating base."
         )
+    if robot.drives or stance.loads:
+        raise InvalidInputError(
+            f"robot {robot.name!r} has joints without a motor of their own, springs, loops, or "
+            "loads on it, which are not simulated. Analyse it at rest, or simulate it without: "
+            "stance.with_loads(()), robot.with_drives(Drives())."
+        )
     spec = mujoco.MjSpec()
     spec.compiler.autolimits = False
     option = spec.option

@@ -162,9 +162,10 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         Balance and limits in shares of the weight, stationarity and complementarity in shares of
         the cost's gradient; recomputed from the stance.
         """
-        base = self.stance.robot.base_nv
+        robot = self.stance.robot
+        base = robot.in_drives(self.multipliers)[: robot.unactuated_nv]
         program = _Problem(self.stance, self._criterion, self.limits).program
-        return program.violation(self.forces, self.multipliers[:base], self.row_multipliers)
+        return program.violation(self.forces, base, self.row_multipliers)
 
     def derivative(
         self, directions: Float[np.ndarray, "nv p"]
@@ -264,7 +265,7 @@ class _Problem:
 
     def __init__(self, stance: Stance, criterion: Criterion, limits: Limits) -> None:
         self.stance, self.criterion = stance, criterion
-        self.nb, self.weight = stance.robot.base_nv, stance.robot.weight
+        self.nb, self.weight = stance.robot.unactuated_nv, stance.robot.weight
         self.load = load = LoadProblem.of(stance)
         self.quadratic: Quadratic = criterion.at(stance)
         self.W = self.quadratic.torque_weight(load)
@@ -317,6 +318,7 @@ class _Problem:
     ) -> ConstrainedEquilibrium:
         """The equilibrium of these forces; `base` are the multipliers of the base's balance."""
         # Stationarity: J nu = W_f (f - f_ref) + A_c' l, with nu_j = W tau + s l.
+        robot = self.stance.robot
         nu = np.zeros(self.nb + len(self.load.torque_offset))
         nu[: self.nb] = base
         nu[self.nb :] = self.W.dot(self.load.torques(f))
@@ -327,7 +329,7 @@ class _Problem:
             self.criterion,
             f,
             self.load.torques(f),
-            nu,
+            robot.from_drives(nu),
             limits,
             self.names,
             self.kinds,
@@ -351,7 +353,7 @@ class _Problem:
 
         The first in two parts, base and joints; the second with the multipliers' part.
         """
-        AV = self.stance.balance_derivative(at.forces).dot(V)
+        AV = self.stance.robot.by_drive(self.stance.balance_derivative(at.forces).dot(V))
         base, joints = AV[: self.nb], AV[self.nb :]
         weighted = self.W.dot(joints)
         if self.quadratic.inertia:

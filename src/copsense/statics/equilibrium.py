@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
 from copsense.criterion import Criterion
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UnbalancedError
 from copsense.load_problem import LoadProblem
+from copsense.robot import Robot
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
 from copsense.statics.policy import BALANCE, WrenchPolicy, policy_forces, policy_name
@@ -27,8 +28,10 @@ class StaticEquilibrium:
     Attributes:
         stance: the stance.
         criterion: what chose the wrenches; a `Criterion` or a `WrenchPolicy`, q -> wrenches.
-        forces: stacked contact forces (m,), contact axes [N, Nm].
-        torques: joint torques (n,) [Nm, or N for a prismatic joint].
+        forces: stacked contact forces, contact axes [N, Nm], then those that keep the robot's own
+            loops and couplings closed (c,); see `wrenches` and `loop_forces`.
+        torques: motor torques (n,) [Nm, or N for a prismatic joint], of every joint that has a
+            motor; see `joint_torques`.
         multipliers: nu (nv,), the sensitivity of the cost to the gravity terms; zero for a policy.
     """
 
@@ -74,6 +77,24 @@ class StaticEquilibrium:
         return self.stance.in_world_axes(self.wrenches)
 
     @property
+    def loop_forces(self) -> dict[str, float]:
+        """What keeps the robot's loops and couplings closed: name of the row -> force [N, Nm].
+
+        Of a ball joint, the force on its first frame in world axes; of a weld, force and moment in
+        the frame's axes. Where rows depend on each other, as in a loop that moves in a plane, it is
+        the smallest of the sets of forces that do the same.
+        """
+        if self.stance.closures is None:
+            return {}
+        found = self.stance.loop_forces(self.forces).tolist()
+        return dict(zip(self.stance.closures.names, found, strict=True))
+
+    @array_property
+    def joint_torques(self) -> Float[np.ndarray, " n"]:
+        """Torque of the motors on each joint (n,), zero where none drives it [Nm, or N]."""
+        return np.array(self.stance.robot.joint_torques(self.torques))
+
+    @property
     def unloaded(self) -> tuple[str, ...]:
         """Names of the contacts without normal force."""
         return self._named(np.abs(self.wrenches[:, 2]) <= UNLOADED * self.stance.robot.weight)
@@ -87,9 +108,10 @@ class StaticEquilibrium:
         """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
         stance, robot = self.stance, self.stance.robot
         needed = np.array(
-            rigid_body.torques_at_rest(robot, stance.q, stance.joint_wrenches(self.forces))
+            rigid_body.torques_at_rest(robot, stance.q, stance.spatial_forces(self.forces))
         )
-        needed[robot.base_nv :] -= self.torques
+        needed -= stance.joint_loads(self.forces)
+        needed[robot.base_nv :] -= self.joint_torques
         return float(np.abs(needed).max())
 
     def derivative(
@@ -174,6 +196,9 @@ def _balanced(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The system's solution of a load, validated."""
     found = system.share(problem)
+    robot = system.stance.robot
+    if robot.unactuated_nv > robot.base_nv or system.stance.closures is not None:
+        _require_balance(robot, problem)
     if not problem.imbalance(found[0]) <= BALANCE * system.stance.robot.weight:
         raise InvalidInputError(
             f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
@@ -182,7 +207,23 @@ def _balanced(
     return found
 
 
+def _require_balance(robot: Robot, problem: LoadProblem) -> None:
+    """Reject a load that joints without a motor leave without an answer."""
+    forces = np.linalg.lstsq(problem.base_map, problem.base_wrench, rcond=1e-10)[0]
+    rest = np.concatenate(
+        [problem.base_wrench - problem.base_map @ forces, np.zeros(len(problem.torque_offset))]
+    )
+    missing = robot.from_drives(rest)
+    if np.abs(missing).max() > BALANCE * robot.weight:
+        largest = np.argsort(-np.abs(missing))[:6]
+        names = robot.velocity_names
+        lacking = {
+            names[i]: float(missing[i]) for i in largest if abs(missing[i]) > BALANCE * robot.weight
+        }
+        raise UnbalancedError(robot.name, lacking)
+
+
 def is_admissible(stance: Stance, directions: np.ndarray) -> bool:
     """Whether velocities (nv,) or (nv, p) leave the contacts at rest, within 1e-6."""
-    moved = np.abs(stance.jacobian @ directions).max(initial=0.0)
+    moved = np.abs(stance.constraints @ directions).max(initial=0.0)
     return bool(moved <= 1e-6 * max(1.0, float(np.abs(directions).max(initial=0.0))))

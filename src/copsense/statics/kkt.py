@@ -41,8 +41,11 @@ class Kkt:
         self.stance = stance
         self.problem: LoadProblem = LoadProblem.of(stance)
         self.quadratic: Quadratic = criterion.at(stance)
-        self.nb: int = stance.robot.base_nv
-        J, quadratic = stance.jacobian, self.quadratic
+        self.nb: int = stance.robot.unactuated_nv
+        quadratic = self.quadratic
+        # Columns in the order of `Robot.by_drive`.
+        J: Float[np.ndarray, "m nv"] = stance.robot.by_drive(stance.constraints.T).T
+        self.jacobian = J
         self.on: Bool[np.ndarray, " nv"] = np.concatenate(
             [np.ones(self.nb, bool), quadratic.active]
         )
@@ -77,7 +80,7 @@ class Kkt:
             x[self.size :] += self.tie.move(problem, x[self.size :])
         nu = np.zeros(len(self.on))
         nu[self.on], forces = x[: self.size], x[self.size :]
-        return forces, problem.torques(forces), nu
+        return forces, problem.torques(forces), self.stance.robot.from_drives(nu)
 
     def _factorise(self) -> None:
         # Weights of any unit (1/limit^2, say) are brought to a common size first: s K s.
@@ -98,7 +101,7 @@ class Kkt:
             return
         # Singular: forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers
         # may be free too (a massless foot), which changes neither forces nor torques.
-        seen = np.vstack([self.stance.jacobian[:, self.on].T, self.quadratic.wrench])
+        seen = np.vstack([self.jacobian[:, self.on].T, self.quadratic.wrench])
         _, s, vt = np.linalg.svd(seen)
         rank = int(np.sum(s > _NULL * s[0]))
         self.free = vt[rank:].T
@@ -121,11 +124,12 @@ class Kkt:
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
         """Derivatives of forces and torques along admissible velocities V."""
         stance = self.stance
-        AV = stance.balance_derivative(at.forces).dot(V)
+        AV = stance.robot.by_drive(stance.balance_derivative(at.forces).dot(V))
         right = np.empty((len(self.matrix), V.shape[1]))
         right[: self.size] = AV[self.on]
         if self.quadratic.inertia:
-            change = self.quadratic.compliance_derivative(stance, self.problem, at.multipliers)
+            nu = stance.robot.in_drives(at.multipliers)
+            change = self.quadratic.compliance_derivative(stance, self.problem, nu)
             right[self.nb : self.size] -= change @ V
         right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
         dx = self.solve(right)
@@ -190,7 +194,11 @@ class TieBreak:
         w = np.zeros(len(first.on))
         w[first.on] = x[: first.size]
         w[nb:] -= W @ at.torques
-        change = stance.motion_derivative(w) @ V - first.problem.joint_map.T @ W @ AV[nb:] + H @ df
+        change = (
+            stance.motion_derivative(stance.robot.from_drives(w)) @ V
+            - first.problem.joint_map.T @ W @ AV[nb:]
+            + H @ df
+        )
         return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
 
 

@@ -32,18 +32,17 @@ def wrench_policy(
 
     def policy(q: np.ndarray) -> np.ndarray:
         here = stance.at(q)
-        if here.rank < len(here.component_index):
+        if here.rank < len(here.constraints):
             raise UndeterminedWrenchError(
                 "torques do not determine the wrenches here: no torque can feel "
                 f"{', '.join(here.redundant_directions)}. Give a policy of wrenches instead.",
                 here.redundant_directions,
             )
-        balance = here.gravity.copy()
-        balance[here.robot.base_nv :] -= finite_array(
-            torques(q), "the torques returned", (len(here.robot.torque_names),), "one per joint"
-        )
+        balance, names = here.balance.copy(), here.robot.torque_names
+        given = finite_array(torques(q), "the torques returned", (len(names),), "one per motor")
+        balance[here.robot.base_nv :] -= here.robot.joint_torques(given)
         # J' f = G - B tau: consistent where the torques hold the robot, so any inverse serves.
-        return here.unstack(np.linalg.lstsq(here.jacobian.T, balance, rcond=None)[0])
+        return here.unstack(np.linalg.lstsq(here.constraints.T, balance, rcond=None)[0])
 
     policy.__name__ = name or policy_name(torques)
     return policy
@@ -88,6 +87,8 @@ def policy_forces(stance: Stance, policy: WrenchPolicy) -> np.ndarray:
     )
     if not stacked:
         wrenches = stance.stack(wrenches)
+    if stance.closures is not None:
+        wrenches = _with_loop_forces(stance, wrenches)
     missing = LoadProblem.of(stance).imbalance(wrenches)
     if missing > BALANCE * stance.robot.weight:
         raise InvalidInputError(
@@ -95,3 +96,11 @@ def policy_forces(stance: Stance, policy: WrenchPolicy) -> np.ndarray:
             "the base. Give what the ground does to the robot, contact axes, force first."
         )
     return wrenches
+
+
+def _with_loop_forces(stance: Stance, forces: np.ndarray) -> np.ndarray:
+    """Contact forces with those behind them that the robot's loops need for the balance."""
+    problem, m = LoadProblem.of(stance), len(forces)
+    missing = problem.base_wrench - problem.base_map[:, :m] @ forces
+    own = np.linalg.lstsq(problem.base_map[:, m:], missing, rcond=1e-10)[0]
+    return np.concatenate([forces, own])

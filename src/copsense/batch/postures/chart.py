@@ -77,6 +77,12 @@ class PostureChart:
             InvalidInputError: no name, one twice, or two that contradict each other.
             UnknownNameError: a name that is not a coordinate.
         """
+        if stance.closures is not None or stance.hanging:
+            raise InvalidInputError(
+                f"robot {stance.robot.name!r} has loops, couplings or joints that hang, which are "
+                "no coordinates of a chart. Sweep it along a path (copsense.lateral_sweep), or "
+                "solve each posture (copsense.solve_posture)."
+            )
         self.stance = stance
         self._coordinates = chart_coordinates(stance, coordinates)
         self.names, self.units = self._coordinates.names, self._coordinates.units
@@ -84,7 +90,7 @@ class PostureChart:
         self.values.flags.writeable = False
         self._joints, self._rows_named = joint_units(stance), row_units(stance, self._coordinates)
         self._code: Callable[..., None] | None = None
-        self.fallback_reason = why_not_covered(stance.robot, tuple(stance.contacts))
+        self.fallback_reason = why_not_covered(stance)
         if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
             self.fallback_reason = "the model's root is not the world"
         if not self.fallback_reason:

@@ -77,7 +77,7 @@ class BatchKernel:
         self._nq = int(stance.robot.model.nq)
         self._expected = arrays_of(self.empty(0))
         served = kernel_criteria(stance, self.criteria)
-        self.fallback_reason = why_not_covered(stance.robot, tuple(stance.contacts))
+        self.fallback_reason = why_not_covered(stance)
         if not self.fallback_reason and not len(served.column):
             self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
         if not self.fallback_reason:

@@ -1,0 +1,177 @@
+"""Load: a known force of the environment on a robot, beside its weight and its contacts.
+
+A wrench w at a point takes J' w off what the torques and contacts must balance, N = G - J' w. How
+that changes with the posture depends on what the wrench is fixed to (theory2.md, section 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense import rigid_body
+from copsense.arrays import finite_array, owned, read_only
+from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.rigid_body import Attachment
+from copsense.robot import Robot
+
+FIXED_TO = ("world", "body")
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Load:
+    """A known wrench on the robot at a point of a link.
+
+    Attributes:
+        frame: name of the frame in the robot's model.
+        force: (3,) [N].
+        moment: about the point (3,) [Nm].
+        point: where it acts, in the frame [m].
+        fixed_to: ``"world"``: force and moment are in world axes and keep their directions;
+            ``"body"``: they are in the frame's axes and turn with the link.
+        name: how it is called in results; default the frame's name.
+    """
+
+    frame: str
+    force: Vector = (0.0, 0.0, 0.0)
+    moment: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
+    fixed_to: Literal["world", "body"] = "world"
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _own(self, {"force": "[N]", "moment": "[Nm]", "point": "[m]"})
+        if self.fixed_to not in FIXED_TO:
+            raise UnknownNameError("reference of a load", str(self.fixed_to), FIXED_TO)
+
+
+@dataclass(frozen=True)
+class SpringLoad:
+    """A rope or a handrail that yields: force F - K (p - p0) on the robot, in world axes.
+
+    Attributes:
+        frame: name of the frame in the robot's model.
+        anchor: p0, where it pulls with `force` (3,), in the world [m].
+        stiffness: K along the world's x, y and z (3,) [N/m].
+        force: F, at the anchor (3,) [N].
+        point: p, where it acts, in the frame [m].
+        name: how it is called in results; default the frame's name.
+    """
+
+    frame: str
+    anchor: Vector
+    stiffness: Vector
+    force: Vector = (0.0, 0.0, 0.0)
+    point: Vector = (0.0, 0.0, 0.0)
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _own(self, {"anchor": "[m]", "stiffness": "[N/m]", "force": "[N]", "point": "[m]"})
+        if min(self.stiffness) < 0:
+            raise InvalidInputError(
+                f"the stiffness of load {self.name!r} is {self.stiffness}. Give three numbers that "
+                "are not negative [N/m]."
+            )
+
+
+AnyLoad = Load | SpringLoad
+
+
+@dataclass(frozen=True, eq=False)
+class AppliedLoads:
+    """Loads on a robot at a configuration.
+
+    Attributes:
+        balanced: sum J' w, what they take off the balance (nv,) [N, Nm].
+        wrenches: world axes, about each point (k, 6) [N, Nm].
+        points: where they act, in the world (k, 3) [m].
+        forces: joint of the model -> spatial force in the joint's axes.
+        derivative: what the derivative of N = G - sum J' w has beside that of forces that turn
+            with their joints (nv, nv).
+    """
+
+    balanced: Float[np.ndarray, " nv"]
+    wrenches: Float[np.ndarray, "k 6"]
+    points: Float[np.ndarray, "k 3"]
+    forces: dict[int, pin.Force]
+    derivative: Float[np.ndarray, "nv nv"]
+
+
+def apply_loads(
+    loads: Sequence[AnyLoad], robot: Robot, q: Float[np.ndarray, " nq"]
+) -> AppliedLoads:
+    """What loads do to a robot at a configuration.
+
+    Raises:
+        UnknownNameError: a load's frame is not in the model.
+    """
+    attachments = []
+    for load in loads:
+        frame = robot.frame(load.frame)
+        place = frame.placement * pin.SE3(np.eye(3), np.array(load.point))
+        attachments.append(Attachment(int(frame.parentJoint), place))
+    places, local = rigid_body.place(robot, q, attachments)
+    nv = robot.model.nv
+    balanced, derivative = np.zeros(nv), np.zeros((nv, nv))
+    wrenches = np.zeros((len(loads), 6))
+    forces: dict[int, pin.Force] = {}
+    for k, (load, here) in enumerate(zip(loads, places, strict=True)):
+        R, J = here.rotation, local[k]
+        if isinstance(load, SpringLoad):
+            stretch = here.translation - np.array(load.anchor)
+            force = np.array(load.force) - np.array(load.stiffness) * stretch
+            wrenches[k, :3] = force
+            across = R @ J[:3]
+            derivative += across.T @ (np.array(load.stiffness)[:, None] * across)
+        elif load.fixed_to == "world":
+            wrenches[k] = np.concatenate([load.force, load.moment])
+        else:
+            wrenches[k] = np.concatenate([R @ np.array(load.force), R @ np.array(load.moment)])
+        own = np.concatenate([R.T @ wrenches[k, :3], R.T @ wrenches[k, 3:]])
+        balanced += J.T @ own
+        if isinstance(load, SpringLoad) or load.fixed_to == "world":
+            derivative -= turning(J, own)
+        joint, placement = attachments[k]
+        spatial = placement.act(pin.Force(own))
+        forces[joint] = forces[joint] + spatial if joint in forces else spatial
+    points = np.array([here.translation for here in places]).reshape(-1, 3)
+    return AppliedLoads(
+        read_only(balanced), read_only(wrenches), owned(points), forces, read_only(derivative)
+    )
+
+
+def turning(
+    local: Float[np.ndarray, "6 nv"], wrench: Float[np.ndarray, " 6"]
+) -> Float[np.ndarray, "nv nv"]:
+    """J_l' [F]x J_a + J_a' [m]x J_a: what a wrench that turns with its link has too much.
+
+    Pinocchio turns forces with their joints; of one that is fixed in the world this is taken away.
+
+    Args:
+        local: Jacobian of the point in its link's axes, linear then angular.
+        wrench: force and moment in the same axes.
+    """
+    linear, angular = local[:3], local[3:]
+    found = linear.T @ pin.skew(wrench[:3]) @ angular
+    if wrench[3:].any():
+        found = found + angular.T @ pin.skew(wrench[3:]) @ angular
+    return np.asarray(found)
+
+
+def _own(load: AnyLoad, vectors: dict[str, str]) -> None:
+    """Name a load and own its vectors."""
+    if not isinstance(load.frame, str) or not load.frame:
+        raise InvalidInputError("a load needs the frame it acts on. Give the name of a frame.")
+    object.__setattr__(load, "name", load.name or load.frame)
+    for name, unit in vectors.items():
+        what = f"the {name} of load {load.name!r}"
+        vector = finite_array(getattr(load, name), what, (3,), f"x, y, z {unit}")
+        object.__setattr__(load, name, tuple(float(c) for c in vector))
