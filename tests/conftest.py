@@ -5,19 +5,17 @@ import os
 # Small matrices on few cores; set before NumPy loads its BLAS.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import support.shape_checks  # noqa: F401 -- the hook below finds it by name
-from jaxtyping import install_import_hook
+import pytest
+from support import shape_checks
 
-# Every shape that copsense annotates is checked while the suite runs, and only then; in a closed
-# loop not at every step.
-install_import_hook("copsense", "support.shape_checks.check")
-
-import pytest  # noqa: E402
-from support.sampled_checks import sample_checks  # noqa: E402
+# The shapes that copsense annotates are checked while the suite runs, and only then.
+shape_checks.install()
 
 import copsense  # noqa: E402
 
-sample_checks()
+
+def pytest_runtest_setup(item):
+    shape_checks.begin_test()
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
+from support import shape_checks
 
 import copsense
 
@@ -16,6 +17,39 @@ def test_a_wrong_shape_is_caught(icub):
     # A name stands for one number wherever it appears: n torques, nv = n + 6 velocities.
     with pytest.raises(TypeCheckError):
         copsense.PosturePath((icub,), "index", "1", np.zeros(2), np.zeros((1, 29)))
+
+
+def test_the_first_calls_of_a_test_are_checked_and_some_of_the_later(icub):
+    right, wrong = np.zeros((2, 6)), np.zeros((2, 5))
+    for _ in range(shape_checks.FIRST):
+        icub.stack(right)
+
+    def caught():
+        try:
+            icub.stack(wrong)
+        except TypeCheckError:
+            return True
+        except ValueError:  # NumPy's, of a call that was not checked
+            return False
+
+    assert sum(caught() for _ in range(2 * shape_checks.EVERY)) == 2
+    shape_checks.begin_test()
+    with pytest.raises(TypeCheckError, match="wrenches"):
+        icub.stack(wrong)
+
+
+def test_a_function_made_within_another_is_checked_too():
+    @shape_checks.checked
+    def outer(value):
+        @shape_checks.checked
+        def inner(x: float) -> float:
+            return x
+
+        return inner(value)
+
+    assert outer(1) == 1
+    with pytest.raises(TypeCheckError):
+        outer("1")
 
 
 def test_what_users_import_checks_nothing():

@@ -3,11 +3,13 @@
 import pkgutil
 import re
 import runpy
-import subprocess
-import sys
+import shlex
 from pathlib import Path
 
 import pytest
+from support.commands import copsense
+
+from copsense import __version__
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
@@ -35,7 +37,8 @@ def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     exec(compile("\n".join(snippets), page, "exec"), {"__name__": "snippet"})
 
 
-def test_commands_of_the_readme_run(tmp_path):
+def test_commands_of_the_readme_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     commands = [
         line.removeprefix("$ ")
         for block in blocks(ROOT / "README.md", "console")
@@ -44,13 +47,8 @@ def test_commands_of_the_readme_run(tmp_path):
     ]
     assert commands
     for command in commands:
-        done = subprocess.run(
-            [sys.executable, "-c", "from copsense.cli import main; main()", *command.split()[1:]],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, f"{command}\n{done.stderr}"
+        done = copsense(*shlex.split(command)[1:])
+        assert done.code == 0, f"{command}\n{done.err}"
 
 
 def new_names():
@@ -74,7 +72,5 @@ def test_names_that_changed_lead_to_names_of_today():
 
 
 def test_citation_gives_the_version():
-    import copsense
-
     citation = (ROOT / "CITATION.cff").read_text("utf-8")
-    assert f"\nversion: {copsense.__version__}\n" in citation
+    assert f"\nversion: {__version__}\n" in citation

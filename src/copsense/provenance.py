@@ -55,6 +55,15 @@ def plain(value: object) -> Any:
     )
 
 
+def read_plain(value: Any) -> Any:
+    """What `plain` wrote, its infinities and NaN as numbers again."""
+    if isinstance(value, Mapping):
+        return {name: read_plain(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [read_plain(part) for part in value]
+    return float(value) if value in ("inf", "-inf", "nan") else value
+
+
 def digest(parameters: object) -> str:
     """SHA-256 of plain data."""
     return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()

@@ -15,7 +15,7 @@ from copsense.extras import require
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits
 from copsense.path import PosturePath
-from copsense.provenance import made_by
+from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
 from copsense.sweep_layout import SweepRows, sweep_dataset
@@ -83,7 +83,7 @@ class Sweep(LabelledResult):
     @property
     def limits(self) -> Limits | None:
         """The limits within which the wrenches were solved; None for none."""
-        found = json.loads(self.attrs.get("limits", "null"))
+        found = read_plain(json.loads(self.attrs.get("limits", "null")))
         if found is None:
             return None
         del found["is"]

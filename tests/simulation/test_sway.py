@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from support.reproductions import small_reproduction
+from support.reproductions import blank_pictures, small_reproduction
 
 import copsense
 from copsense.paper.claims import Verdict, evaluate_sway_claims, stretch
 from copsense.paper.report import report_figures, write_report
 from copsense.paper.report.closed_loop_section import score_rows, sway_runs
 from copsense.paper.reproduce import LIMITS, sway_in_simulation
+from copsense.plots import render_figure
 
 WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 
@@ -68,7 +69,7 @@ def test_claims_fail_on_other_recordings(sway):
     assert verdicts(tipping)["loop-limits"] is Verdict.DOES_NOT_HOLD
 
 
-def test_the_report_shows_the_closed_loop(sway, tmp_path):
+def test_the_report_shows_the_closed_loop(sway, tmp_path, monkeypatch):
     claims = evaluate_sway_claims(sway)
     table = pd.DataFrame(
         [
@@ -85,8 +86,12 @@ def test_the_report_shows_the_closed_loop(sway, tmp_path):
         ]
     )
     reproduction = replace(small_reproduction(), sway=sway, sway_claims=claims, benchmark=table)
-    names = {f.name for f in report_figures(reproduction)}
-    assert {"loop_6a", "loop_6b", "loop_7a", "loop_7b", "loop_8", "loop_9b"} <= names
+    figures = {f.name: f for f in report_figures(reproduction)}
+    loop = {"loop_6a", "loop_6b", "loop_7a", "loop_7b", "loop_8", "loop_9b"}
+    assert loop <= figures.keys()
+    drawn = {name: render_figure(f.draw(), ".svg") for name, f in figures.items() if name in loop}
+    assert len(set(drawn.values())) == len(loop)
+    blank_pictures(monkeypatch)
     page = write_report(reproduction, tmp_path / "report").read_text(encoding="utf-8")
     assert 'id="closed-loop"' in page
     assert 'href="#closed-loop"' in page

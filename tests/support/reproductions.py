@@ -1,7 +1,10 @@
 """A reproduction with few postures, computed once for every test that looks at one."""
 
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
+from copsense.paper.report import report_figures, report_folder
 from copsense.paper.reproduce import reproduce_paper
 
 POSTURES = 21
@@ -10,3 +13,16 @@ POSTURES = 21
 @cache
 def small_reproduction():
     return reproduce_paper(postures=POSTURES)
+
+
+def blank_pictures(monkeypatch):
+    """Reports have pictures that cost nothing, for tests that are not about them."""
+
+    def blank():
+        return SimpleNamespace(set_layout_engine=lambda engine: None)
+
+    def figures(reproduction):
+        return [replace(figure, draw=blank) for figure in report_figures(reproduction)]
+
+    monkeypatch.setattr(report_folder, "report_figures", figures)
+    monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")

@@ -18,7 +18,7 @@ from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.freedom import freedom_notes
 from copsense.json_data import json_data
-from copsense.limits import Limits, torque_placeholders
+from copsense.limits import Limits, limit_rows, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
 from copsense.robots import plausibility_notes, sole_notes
@@ -263,6 +263,11 @@ def _limit_notes(
         notes.append(
             "no torque limit in the model (a placeholder) for: "
             + ", ".join(torque_placeholders(stance))
+        )
+    if limits is not None and not limit_rows(stance, limits).all_names:
+        notes.append(
+            "the limits that are switched on limit nothing here: they need a friction coefficient, "
+            "a sole or a torque bound that this stance does not have."
         )
     return notes + [
         f"the limits that {name} presses here are degenerate: the next change of them cannot be "

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from copsense.arrays import finite_array
+from copsense.arrays import finite_array, is_finite
 from copsense.controllers.target import Target
 from copsense.errors import ControllerError, InvalidInputError
 
@@ -114,6 +114,6 @@ def ask(
 def _copied(values: Any, what: str, shape: tuple[int, ...], meaning: str) -> np.ndarray:
     """A copy of a finite array."""
     usual = isinstance(values, np.ndarray) and values.dtype == np.float64
-    if usual and values.shape == shape and np.all(np.isfinite(values)):  # the fast path
+    if usual and values.shape == shape and is_finite(values):  # the fast path
         return values.copy()
     return finite_array(values, what, shape, meaning).copy()

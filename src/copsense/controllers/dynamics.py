@@ -46,6 +46,13 @@ class StandingDynamics:
         self.model: pin.Model = robot.model
         self.data: pin.Data = robot.model.createData()
         self.mass: float = robot.mass
+        # Views of Pinocchio's arrays: to ask it for them takes longer than to read them.
+        self.M: Float[np.ndarray, "nv nv"] = self.data.M
+        self.h: Float[np.ndarray, " nv"] = self.data.nle
+        self.angular_map: Float[np.ndarray, "3 nv"] = self.data.Ag[3:]
+        self.com: Float[np.ndarray, " 3"] = self.data.com[0]
+        self.com_velocity: Float[np.ndarray, " 3"] = self.data.vcom[0]
+        self._base: pin.SE3 = self.data.oMi[1]
         # Row-major, so that J' is as LAPACK wants it.
         self.J: Float[np.ndarray, "m nv"] = np.zeros((stance.rows[-1].stop, robot.model.nv))
         self.bias: Float[np.ndarray, " m"] = np.zeros(len(self.J))
@@ -64,11 +71,6 @@ class StandingDynamics:
         model, data = self.model, self.data
         # One pass for M, h, J, A_G and the accelerations of the links under dv = 0.
         pin.computeAllTerms(model, data, q, v)
-        self.M: Float[np.ndarray, "nv nv"] = data.M
-        self.h: Float[np.ndarray, " nv"] = data.nle
-        self.angular_map: Float[np.ndarray, "3 nv"] = data.Ag[3:]
-        self.com: Float[np.ndarray, " 3"] = data.com[0]
-        self.com_velocity: Float[np.ndarray, " 3"] = data.vcom[0]
         for joint, place, axes, rows in self._contacts:
             local = pin.getFrameJacobian(model, data, joint, place, _LOCAL)
             if axes is None:
@@ -84,7 +86,7 @@ class StandingDynamics:
         self, force: Float[np.ndarray, " 3"], moment: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, " 6"]:
         """A wrench about the centre of mass, world axes, as one on the base in its own axes."""
-        base = self.data.oMi[1]
+        base = self._base
         # Written out: np.cross alone would take a tenth of the controller's step.
         (x, y, z), (fx, fy, fz) = (self.com - base.translation).tolist(), force.tolist()
         mx, my, mz = moment.tolist()

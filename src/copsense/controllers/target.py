@@ -7,7 +7,9 @@ A signal (`Hold`, `Sine`, `Ramp`) says how far along a path the robot should be 
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -209,40 +211,50 @@ class PathReference:
                     f"the reference cannot be followed at {path.coordinate} = {values[i]:g}: "
                     f"{reason}"
                 )
-        self._values = values
-        self._model = path.stances[0].robot.model
-        self._com = np.array([s.com for s in path.stances])
-        self._slope = np.array(
-            [s.com_jacobian @ t for s, t in zip(path.stances, path.tangents, strict=True)]
+        self._values: list[float] = values.tolist()
+        stances = path.stances
+        self._model = stances[0].robot.model
+        self._com = np.array([s.com for s in stances])
+        self._q = [s.q for s in stances]
+        # Of each interval: what the basis below weighs, for the CoM and then the configuration.
+        ends = np.array(
+            [
+                np.concatenate([s.com_jacobian @ t, t])
+                for s, t in zip(stances, path.tangents, strict=True)
+            ]
         )
-        self._q = [s.q for s in path.stances]
-        self._steps = [
-            pin.difference(self._model, a, b) for a, b in zip(self._q, self._q[1:], strict=False)
-        ]
+        h = np.diff(values)[:, None]
+        steps = [pin.difference(self._model, a, b) for a, b in pairwise(self._q)]
+        self._shapes = np.stack(
+            [h * ends[:-1], np.hstack([np.diff(self._com, axis=0), steps]), h * ends[1:]], axis=1
+        )
 
     def at(self, time: float) -> Target:
-        """The target at a time [s]."""
+        """The target at a time [s], its arrays read-only."""
         value, rate, second = self.signal.at(time)
         values = self._values
-        i = min(max(int(np.searchsorted(values, value, side="right")) - 1, 0), len(values) - 2)
+        i = min(max(bisect_right(values, value) - 1, 0), len(values) - 2)
         h = values[i + 1] - values[i]
         u = (value - values[i]) / h
         # Cubic Hermite basis and its derivatives.
-        shape = np.array([u * (1 - u) ** 2, u * u * (3 - 2 * u), u * u * (u - 1)])
-        slope = np.array([(1 - u) * (1 - 3 * u), 6 * u * (1 - u), u * (3 * u - 2)]) / h
-        bend = np.array([6 * u - 4, 6 - 12 * u, 6 * u - 2]) / h**2
-        com = np.array(
-            [h * self._slope[i], self._com[i + 1] - self._com[i], h * self._slope[i + 1]]
+        basis = np.array(
+            (
+                (u * (1 - u) ** 2, u * u * (3 - 2 * u), u * u * (u - 1)),
+                ((1 - u) * (1 - 3 * u) / h, 6 * u * (1 - u) / h, u * (3 * u - 2) / h),
+                ((6 * u - 4) / h**2, (6 - 12 * u) / h**2, (6 * u - 2) / h**2),
+            )
         )
-        q = np.array([h * self.path.tangents[i], self._steps[i], h * self.path.tangents[i + 1]])
-        along = slope @ com
-        return Target(
-            self._com[i] + shape @ com,
-            along * rate,
-            along * second + bend @ com * rate**2,
-            pin.integrate(self._model, self._q[i], shape @ q),
-            slope @ q * rate,
+        moved, slope, bend = basis.dot(self._shapes[i])
+        found = (
+            self._com[i] + moved[:3],
+            slope[:3] * rate,
+            slope[:3] * second + bend[:3] * rate**2,
+            pin.integrate(self._model, self._q[i], moved[3:]),
+            slope[3:] * rate,
         )
+        for array in found:
+            array.setflags(write=False)
+        return Target(*found)
 
 
 def lateral_reference(stance: Stance, signal: Signal) -> PathReference:

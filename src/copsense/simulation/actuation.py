@@ -37,11 +37,14 @@ class Actuation:
             if motors.bandwidth is None
             else math.exp(-2.0 * math.pi * motors.bandwidth * time_step)
         )
+        self._shaped = bool(self._delay or self._limited or self._keep)
         self._line: deque[np.ndarray] = deque()
         self._applied: np.ndarray | None = None
 
     def apply(self, command: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """The torques of the next physics step; to be called once for each."""
+        if not self._shaped:
+            return command
         if self._applied is None:
             self._line.extend([command] * self._delay)
             self._applied = self._clip(command)

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from copsense.arrays import finite_number
+from copsense.arrays import finite_number, is_finite
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.criterion import Criterion
@@ -150,7 +150,7 @@ def _run(
             for _ in range(steps):
                 torques = actuation.apply(command.torques)
                 now = simulator.step(torques, pushes.at(now))
-            if not (np.all(np.isfinite(now.q)) and np.all(np.isfinite(now.v))):
+            if not (is_finite(now.q) and is_finite(now.v)):
                 now = here
                 raise SimulatorStoppedError("the motion is no longer finite", time)
             now = sensors.measured(now)
@@ -166,7 +166,7 @@ def _run(
         contact = watch.contact_event(now) if tip is None else None
         if contact:
             tip, tip_com = contact, com
-        over = watch.end_event(now, float(com[2]))
+        over = watch.end_event(now, com[2])
         ends = over or (contact if until == "tip" else None)
         if number % every == 0 or ends or number == count - 1:
             recorder.add(here, now, target, command, torques, watch.tilts(now))
@@ -213,8 +213,8 @@ def _shown(
     time: float, q: np.ndarray, v: np.ndarray, target: Target, wrenches: np.ndarray
 ) -> Observation:
     """What the controller receives, read-only."""
-    q, v, wrenches = (seen.view() for seen in (q, v, wrenches))
-    for seen in (q, v, wrenches, *vars(target).values()):
+    q, v, wrenches = q.view(), v.view(), wrenches.view()
+    for seen in (q, v, wrenches):
         seen.setflags(write=False)
     return Observation(time, q, v, target, wrenches)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,6 +70,10 @@ class EventDetector:
         self._axes = np.array([p.rotation for p in stance.placements])
         self._corners = [c.sole.vertices if c.sole else np.zeros((1, 2)) for c in stance.contacts]
         self._reach = np.array([np.linalg.norm(c, axis=1).max() for c in self._corners])
+        # For `_stands`: a point has no sole that could turn; the chord of a turn by `tilt`.
+        self._soles = self._turns.astype(float)[:, None, None]
+        self._farthest = float(self._reach.max())
+        self._chord = 2.0 * math.sin(min(thresholds.tilt, math.pi) / 2)
         self._ground = float(self._origins[:, 2].mean())
         self._height = float(stance.com[2]) - self._ground
         self._base = stance.q[3:7]
@@ -78,6 +83,8 @@ class EventDetector:
 
     def contact_event(self, now: Snapshot) -> Event | None:
         """The first contact that has tipped, lifted or slipped, if any."""
+        if self._stands(now):
+            return None
         tilts = self.tilts(now)
         lifts = np.einsum("ij,ij->i", now.positions - self._origins, self._normals)
         for k, name in enumerate(self._names):
@@ -97,6 +104,22 @@ class EventDetector:
             )
             return Event("slip", now.time, message, self._names[k])
         return None
+
+    def _stands(self, now: Snapshot) -> bool:
+        """Whether all contacts together have moved less than would be an event of one.
+
+        At nearly every step this is all that has to be computed. A turn by an angle a moves what
+        is at a distance r by at most 2 r sin(a / 2), and R - R_0 has the norm 2 sqrt(2) sin(a / 2).
+        """
+        moved = (now.positions - self._origins).ravel()
+        turned = ((now.rotations - self._axes) * self._soles).ravel()
+        far, chord = math.sqrt(moved.dot(moved)), math.sqrt(turned.dot(turned) / 2)
+        limits = self._limits
+        return (
+            chord <= self._chord
+            and far <= limits.lift
+            and far + self._farthest * chord <= limits.slip
+        )
 
     def slips(self, now: Snapshot) -> np.ndarray:
         """How far each contact's farthest corner has moved along the plane (nc,) [m].
@@ -122,12 +145,13 @@ class EventDetector:
 
     def com(self, now: Snapshot) -> np.ndarray:
         """Centre of mass (3,), world [m]."""
-        return np.array(pin.centerOfMass(self._model, self._data, now.q))
+        return pin.centerOfMass(self._model, self._data, now.q).copy()
 
     def end_event(self, now: Snapshot, com_height: float) -> Event | None:
         """A fall or a divergence, which ends a run."""
-        fastest = int(np.argmax(np.abs(now.v[6:]))) if len(now.v) > 6 else -1
-        speed = float(now.v[6 + fastest]) if fastest >= 0 else 0.0
+        joints = now.v[6:]
+        fastest = int(np.abs(joints).argmax()) if len(joints) else -1
+        speed = float(joints[fastest]) if fastest >= 0 else 0.0
         if abs(speed) > self._limits.speed:
             return Event(
                 "diverged",
@@ -139,8 +163,7 @@ class EventDetector:
         if height < self._limits.fall * self._height:
             return Event("fall", now.time, f"fell: the CoM is {height:.3f} m over the ground")
         # |cos| of half the angle between two unit quaternions.
-        cosine = min(1.0, abs(float(self._base @ now.q[3:7])))
-        turned = 2.0 * np.arccos(cosine)
+        turned = 2.0 * math.acos(min(1.0, abs(float(self._base.dot(now.q[3:7])))))
         if turned > self._limits.base_tilt:
             return Event(
                 "fall", now.time, f"fell: the base has turned {np.degrees(turned):.0f} deg"

@@ -50,6 +50,8 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     option.impratio, option.tolerance, option.iterations = settings.impedance_ratio, 1e-10, 100
     # Without this flag a fall restarts the simulation without an error.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    # One robot is one island: to look for others, and to copy its matrices, would be wasted.
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     bodies = {0: spec.worldbody}
     for i in range(1, model.njoints):
         bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])

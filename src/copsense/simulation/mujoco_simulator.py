@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from copsense.arrays import is_finite
 from copsense.errors import (
     EngineMismatchError,
     InvalidInputError,
@@ -22,6 +23,7 @@ from copsense.errors import (
 )
 from copsense.extras import require
 from copsense.robot import Robot
+from copsense.simulation.contact_wrenches import ContactWrenches
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
@@ -63,28 +65,30 @@ class MujocoSimulator:
         self.settings: PhysicsSettings = settings or PhysicsSettings()
         self._mujoco = load_mujoco()
         self._source = wrenches
-        self._feet = _feet(stance) if wrenches == "sensors" else ()
-        self._model = build_model(self._mujoco, stance, self.settings, sensors=bool(self._feet))
+        sensors = wrenches == "sensors"
+        self._model = build_model(self._mujoco, stance, self.settings, sensors=sensors)
         self._data = self._mujoco.MjData(self._model)
-        joints = [self._model.joint(name) for name in stance.robot.joint_names]
-        self._columns = np.concatenate([np.arange(6), [int(j.dofadr[0]) for j in joints]])
-        self._positions = np.array([int(j.qposadr[0]) for j in joints], dtype=int)
-        self._sites = [self._model.site(f"contact {name}").id for name in stance.contact_names]
-        points = [self._model.geom(g).name.partition(" | ") for g in range(self._model.ngeom)]
-        self._contact_of = np.array(
-            [stance.contact_names.index(name) if mark else -1 for name, mark, _ in points]
+        self._wrenches = ContactWrenches(
+            self._mujoco, self._model, self._data, stance, sensors=sensors
         )
+        joints = [self._model.joint(name) for name in stance.robot.joint_names]
+        self._columns = _indices([*range(6), *(int(j.dofadr[0]) for j in joints)])
+        self._joints = _indices([int(j.dofadr[0]) for j in joints])
+        self._positions = _indices([int(j.qposadr[0]) for j in joints])
+        self._sites = _indices(
+            [self._model.site(f"contact {name}").id for name in stance.contact_names]
+        )
+        # Views of the engine's memory: to ask it for them takes longer than to read them.
+        data = self._data
+        self._qpos, self._qvel, self._applied = data.qpos, data.qvel, data.qfrc_applied
+        self._site_positions = data.site_xpos
+        self._site_axes = data.site_xmat.reshape(-1, 3, 3)
+        self._warnings = data.warning.number
         self._circles = _circles(stance.robot)
         self._is_plain = np.array([not circle for _, circle in self._circles], dtype=bool)
         self._plain = np.array([i for i, circle in self._circles if not circle], dtype=int)
         self._round = np.array([i for i, circle in self._circles if circle], dtype=int)
-        self._fixed_axes = {
-            k: world.rotation
-            for k, (c, world) in enumerate(zip(stance.contacts, stance.placements, strict=True))
-            if c.kind == "point"
-        }
-        under = self._model.pair_geom2[: self._model.npair]
-        self._contact_of_pair = self._contact_of[under]
+        self._contact_of_pair = self._wrenches.contact_of_pairs()
         self._friction = self._model.pair_friction.copy()
         self._compare()
         self.reset()
@@ -116,26 +120,26 @@ class MujocoSimulator:
         external: Float[np.ndarray, " nv"] | None = None,
     ) -> Snapshot:
         """Advance by one time step; see `Simulator.step`."""
-        data, before = self._data, float(self._data.time)
+        data, applied, before = self._data, self._applied, float(self._data.time)
         # Motors and pushes are generalised forces, without MuJoCo's gears and ranges.
-        data.qfrc_applied[self._columns[6:]] = torques
-        data.qfrc_applied[:6] = 0.0
+        applied[self._joints] = torques
+        applied[:6] = 0.0
         if external is not None:
-            base = pin.Quaternion(*self._data.qpos[3:7]).matrix()
-            data.qfrc_applied[:3] = base @ external[:3]
-            data.qfrc_applied[3:6] = external[3:6]
-            data.qfrc_applied[self._columns[6:]] += external[6:]
+            base = pin.Quaternion(*self._qpos[3:7]).matrix()
+            applied[:3] = base @ external[:3]
+            applied[3:6] = external[3:6]
+            applied[self._joints] += external[6:]
         shown = self._mujoco.get_mju_user_warning()
         self._mujoco.set_mju_user_warning(_quiet)  # else it writes a log file here
         self._mujoco.mj_step(self._model, data)
         self._mujoco.set_mju_user_warning(shown)
-        warned = [w for w in _FATAL if data.warning[getattr(self._mujoco.mjtWarning, w)].number]
+        warned = self._fatal_warnings() if self._warnings.any() else []
         if warned or not data.time > before:
             raise SimulatorStoppedError(
                 f"MuJoCo stopped ({', '.join(warned) or 'it reset itself'}): the motion diverged",
                 before,
             )
-        if not (np.all(np.isfinite(data.qpos)) and np.all(np.isfinite(data.qvel))):
+        if not (is_finite(self._qpos) and is_finite(self._qvel)):
             raise SimulatorStoppedError("the motion is no longer finite", before)
         return self._snapshot(measured=True)
 
@@ -150,6 +154,11 @@ class MujocoSimulator:
         """The same simulator with another robot on the same contacts."""
         return MujocoSimulator(stance, self.settings, wrenches=self._source)
 
+    def _fatal_warnings(self) -> list[str]:
+        """Names of the engine's warnings since the reset after which its state is not valid."""
+        kinds = self._mujoco.mjtWarning
+        return [name for name in _FATAL if self._warnings[int(getattr(kinds, name))]]
+
     def _move(self, q: np.ndarray, v: np.ndarray) -> None:
         """Write a configuration and velocity of Pinocchio into MuJoCo's state."""
         x, y, z, w = q[3:7]
@@ -162,66 +171,26 @@ class MujocoSimulator:
         self._data.qvel[:3] = pin.Quaternion(w, x, y, z).matrix() @ v[:3]
 
     def _snapshot(self, *, measured: bool) -> Snapshot:
-        data = self._data
+        turned = self._qpos[3:7]
         q = np.empty(self._stance.robot.model.nq)
-        w, x, y, z = data.qpos[3:7]
-        q[:7] = [*data.qpos[:3], x, y, z, w]
-        angles = data.qpos[self._positions]
-        q[self._plain] = angles[self._is_plain]
+        q[:3], q[3:6], q[6] = self._qpos[:3], turned[1:], turned[0]
+        angles = self._qpos[self._positions]
         if len(self._round):
+            q[self._plain] = angles[self._is_plain]
             turns = angles[~self._is_plain]
             q[self._round], q[self._round + 1] = np.cos(turns), np.sin(turns)
-        v = data.qvel[self._columns]
+        else:
+            q[7:] = angles
+        v = self._qvel[self._columns].copy()
         # MuJoCo's base: linear velocity in world axes, angular in its own.
-        v[:3] = pin.Quaternion(w, x, y, z).matrix().T @ v[:3]
-        rotations = data.site_xmat[self._sites].reshape(-1, 3, 3).copy()
-        positions = data.site_xpos[self._sites].copy()
-        wrenches = np.zeros((len(self._sites), 6))
+        v[:3] = v[:3].dot(pin.Quaternion(*turned.tolist()).matrix())
+        rotations = self._site_axes[self._sites].copy()
+        positions = self._site_positions[self._sites].copy()
         if measured:
-            measure = self._sensed if self._feet else self._wrenches
-            wrenches = measure(positions, rotations)
-        return Snapshot(float(data.time), q, v, wrenches, positions, rotations)
-
-    def _wrenches(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
-        """Contact forces of the last step, summed about each contact frame, in its axes."""
-        data, found = self._data, self._data.contact
-        forces, moments = np.zeros((2, len(self._sites), 3))
-        touching = np.flatnonzero(found.efc_address >= 0)
-        if len(touching):
-            owner, start = self._contact_of[found.geom[touching, 1]], found.efc_address[touching]
-            # Elliptic cones: the solver's forces are (normal, tangent, tangent) in the contact's
-            # axes, the rows of its frame.
-            local = data.efc_force[start[:, None] + _THREE]
-            force = np.einsum("ci,cij->cj", local, found.frame[touching].reshape(-1, 3, 3))
-            arm = found.pos[touching] - positions[owner]
-            np.add.at(forces, owner, force)
-            np.add.at(moments, owner, _cross(arm, force))
-        if self._fixed_axes:
-            rotations = rotations.copy()
-        for k, axes in self._fixed_axes.items():
-            rotations[k], moments[k] = (
-                axes,
-                0.0,
-            )  # the only moment of a point is that of its ball's radius
-        turned = np.stack([forces, moments], axis=1) @ rotations
-        return np.asarray(turned.reshape(len(self._sites), 6))
-
-    def _sensed(self, positions: np.ndarray, rotations: np.ndarray) -> Float[np.ndarray, "nc 6"]:
-        """Contact wrenches from six-axis sensors above the feet: reading plus foot's weight.
-
-        Exact at rest; in motion the foot's own acceleration is missing, as on a real robot.
-        """
-        # The sensor measures the wrench of the link above on the foot, about the contact frame.
-        wrenches = -self._data.sensordata.reshape(len(self._feet), 6)
-        gravity = self._stance.robot.model.gravity.linear
-        for k, (mass, lever) in enumerate(self._feet):
-            R = rotations[k]
-            weight = R.T @ (mass * gravity)
-            wrenches[k] -= np.concatenate([weight, np.cross(lever, weight)])
-        for k, axes in self._fixed_axes.items():
-            wrenches[k, :3] = axes.T @ rotations[k] @ wrenches[k, :3]
-            wrenches[k, 3:] = 0.0
-        return wrenches
+            wrenches = self._wrenches.measure(positions, rotations)
+        else:
+            wrenches = np.zeros((len(positions), 6))
+        return Snapshot(self._data.time, q, v, wrenches, positions, rotations)
 
     def _compare(self) -> None:
         """Compare both engines at the start, and at a nearby posture in motion."""
@@ -236,7 +205,7 @@ class MujocoSimulator:
             self._mujoco.mj_fullM(self._model, self._data, M)
             world = np.eye(model.nv)
             world[:3, :3] = pin.Quaternion(*self._data.qpos[3:7]).matrix()
-            M = world.T @ M[np.ix_(self._columns, self._columns)] @ world
+            M = world.T @ M[self._columns][:, self._columns] @ world
             bias = world.T @ self._data.qfrc_bias[self._columns]
             # MuJoCo differentiates the base's linear velocity in world axes, Pinocchio in its own.
             drift = zero.copy()
@@ -259,15 +228,15 @@ class MujocoSimulator:
                     )
 
 
-_THREE = np.arange(3)
 _FATAL = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC", "mjWARN_BADCTRL")
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Rows of a x b; np.cross would take longer than the rest of a step."""
-    x, y, z = a.T
-    u, v, w = b.T
-    return np.column_stack([y * w - z * v, z * u - x * w, x * v - y * u])
+def _indices(found: list[int]) -> slice | Int[np.ndarray, " k"]:
+    """Indices as a slice where they follow each other: it is read at once."""
+    first = found[0] if found else 0
+    if found == list(range(first, first + len(found))):
+        return slice(first, first + len(found))
+    return np.array(found, dtype=int)
 
 
 def _quiet(message: str) -> None:
@@ -294,19 +263,3 @@ def load_mujoco() -> Any:
 def _circles(robot: Robot) -> list[tuple[int, bool]]:
     """Each joint's index in a configuration, and whether it is stored as (cos, sin)."""
     return [(joint.idx_q, joint.nq == 2) for joint in list(robot.model.joints)[2:]]
-
-
-def _feet(stance: Stance) -> tuple[tuple[float, np.ndarray], ...]:
-    """Mass of the link of each contact, and its centre in the contact frame [m]."""
-    robot, found, links = stance.robot, [], set()
-    for contact in stance.contacts:
-        at = contact.on(robot)
-        if at.joint in links or at.joint < 2:
-            raise InvalidInputError(
-                f"contact {contact.name!r} shares its link with another contact, or is on the "
-                'base: a sensor cannot tell them apart. Measure wrenches from "contacts".'
-            )
-        links.add(at.joint)
-        inertia = robot.model.inertias[at.joint]
-        found.append((float(inertia.mass), at.placement.actInv(inertia.lever)))
-    return tuple(found)

@@ -22,6 +22,8 @@ class PushForces:
 
     def at(self, now: Snapshot) -> Float[np.ndarray, " nv"] | None:
         """Generalised force (nv,) of all pushes during the next step, or None without any."""
+        if not self._pushes:
+            return None
         shares = [push.share(now.time, self._step) for push in self._pushes]
         if not any(shares):
             return None

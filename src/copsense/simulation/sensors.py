@@ -29,6 +29,7 @@ class Sensors:
         self._quiet = not (noise.position or noise.velocity)
         self._since, self._weight = np.inf, stance.robot.weight
         self._spread = np.repeat([noise.force, noise.moment], 3)
+        self._exact = not np.any(self._spread)
         self._odometry = (
             None if scenario.odometry is None else FootOdometry(stance, scenario.odometry)
         )
@@ -60,7 +61,7 @@ class Sensors:
 
     def measured(self, now: Snapshot) -> Snapshot:
         """The snapshot with noise on its wrenches."""
-        if not np.any(self._spread):
+        if self._exact:
             return now
         noise = self._spread * self._wrench_random.standard_normal(now.wrenches.shape)
         return replace(now, wrenches=now.wrenches + noise)

@@ -1,13 +1,10 @@
 """The report in a browser: everything loads, nothing is fetched, and it fits a phone."""
 
 import shutil
-import tempfile
-from pathlib import Path
 
 import pytest
-from support.reproductions import small_reproduction
 
-from copsense.paper.report import report_figures, write_report
+from copsense.paper.report import report_figures
 
 sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -20,11 +17,6 @@ ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disa
 
 
 @pytest.fixture(scope="module")
-def reproduction():
-    return small_reproduction()
-
-
-@pytest.fixture(scope="module")
 def browser():
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=EXECUTABLE, args=ARGUMENTS)
@@ -33,13 +25,11 @@ def browser():
 
 
 @pytest.fixture(scope="module")
-def address(reproduction):
+def address(folder, tmp_path_factory):
     # The page alone, in a folder of its own: nothing beside it may be needed.
-    with tempfile.TemporaryDirectory() as folder:
-        page = write_report(reproduction, Path(folder) / "report")
-        alone = shutil.copy(page, Path(folder) / "alone.html")
-        shutil.rmtree(page.parent)
-        yield Path(alone).as_uri()
+    alone = tmp_path_factory.mktemp("alone") / "alone.html"
+    shutil.copy(folder / "report.html", alone)
+    return alone.as_uri()
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 
 import pytest
 from click.testing import CliRunner
-from support.reproductions import small_reproduction
+from support.reproductions import blank_pictures
 
 import copsense
 from copsense.cli import copsense as command_line
@@ -25,8 +25,6 @@ from copsense.paper.report.page import number
 from copsense.paper.report.typesetting import typeset
 from copsense.paper.report.words import commands, summary
 from copsense.plots import render_figure
-
-COMMAND = "copsense reproduce --postures 21"
 
 
 class Page(HTMLParser):
@@ -54,18 +52,6 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def reproduction():
-    return small_reproduction()
-
-
-@pytest.fixture(scope="module")
-def folder(reproduction, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("written") / "deep" / "report"
-    assert write_report(reproduction, folder, command=COMMAND) == folder / "report.html"
-    return folder
-
-
-@pytest.fixture(scope="module")
 def text(folder):
     return (folder / "report.html").read_text(encoding="utf-8")
 
@@ -77,8 +63,8 @@ def page(text):
 
 @pytest.fixture
 def quick(monkeypatch):
-    """Pictures that cost nothing, for what is not about them."""
-    monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")
+    """Reports are written without their pictures."""
+    blank_pictures(monkeypatch)
 
 
 def read_table(path):
@@ -145,7 +131,9 @@ def test_the_summary_has_the_numbers(reproduction):
     assert counts[0] == len(reproduction.claims) == sum(counts[1:4])
 
 
-def test_every_erratum_reference_value_and_version_is_on_the_page(page, text, reproduction):
+def test_every_erratum_reference_value_and_version_is_on_the_page(
+    page, text, reproduction, command
+):
     words = " ".join("".join(page.text["body"]).split())
     assert len(page.all("table")) == 5
     cells = sum(tag == "tr" for tag, _ in page.tags)
@@ -155,13 +143,13 @@ def test_every_erratum_reference_value_and_version_is_on_the_page(page, text, re
     for name, version in reproduction.versions.items():
         assert f"<dt>{name}</dt><dd>{version}</dd>" in text
     assert "amplitude" in words
-    assert COMMAND in words
+    assert command in words
 
 
-def test_the_same_reproduction_gives_the_same_page(reproduction, text):
+def test_the_same_reproduction_gives_the_same_page(reproduction, text, command):
     figures = report_figures(reproduction)
     pictures = {f.name: render_figure(f.draw(), ".svg") for f in figures}
-    assert render_page(reproduction, pictures, figures, command=COMMAND) == text
+    assert render_page(reproduction, pictures, figures, command=command) == text
 
 
 def test_what_the_user_typed_is_shown_and_not_interpreted(reproduction):
@@ -230,14 +218,16 @@ def test_the_data_lie_beside_and_read_back(folder, reproduction):
     assert len(read_table(data / "icub_lateral.csv")) == reproduction.postures * 3 * 2
 
 
-def test_the_commands_shown_run(reproduction, tmp_path, monkeypatch):
-    """Each as the page shows it, with fewer postures."""
+def test_the_commands_shown_run(reproduction, command, tmp_path, monkeypatch):
+    """Each as the page shows it, with fewer postures and a coarser search."""
     monkeypatch.chdir(tmp_path)
-    shown = commands(reproduction, COMMAND)
-    assert shown.pop("all") == (COMMAND,)
+    shown = commands(reproduction, command)
+    assert shown.pop("all") == (command,)
     for line in [line for lines in shown.values() for line in lines]:
         program, *arguments = shlex.split(line.replace(":21 ", ":5 "))
         assert program == "copsense"
+        if arguments[0] == "design":
+            arguments += ["--grid", "2", "--com-y", "-0.08:0.08:9"]
         result = CliRunner().invoke(command_line, arguments)
         assert result.exit_code == 0, (line, result.output)
 
