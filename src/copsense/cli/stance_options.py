@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import limits_option
+from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
@@ -74,6 +75,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        load_options,
         limits_option,
     ]
     return with_options(options, command)
@@ -89,6 +91,8 @@ def read_stance(
     posture: tuple[str, ...],
     base_yaw: float | None,
     width: float | None,
+    loads: tuple[str, ...] = (),
+    payloads: tuple[str, ...] = (),
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -116,7 +120,7 @@ def read_stance(
     # Which unit a bare number has depends on the joint.
     positions = read_positions(posture, model) if model is not None else {}
     frames = model.frame_names if model is not None else ()
-    return load_stance(
+    stance = load_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
@@ -125,6 +129,7 @@ def read_stance(
         base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
         width=width,
     )
+    return put_loads(stance, loads, payloads)
 
 
 def _read_contacts(
