@@ -145,7 +145,7 @@ def made_by(
     Returns:
         ``criteria``: JSON of `Criterion.to_dict` for each, or ``{"policy": name}``; ``limits``:
         JSON of the limits, ``"null"`` without; ``model_digest``: of the robot and its contacts'
-        frames; ``contacts``: JSON of the contacts.
+        frames; ``contacts``: JSON of the contacts; ``notes``: JSON of the robot's notes.
     """
     return {
         "criteria": json.dumps(
@@ -154,6 +154,7 @@ def made_by(
         "limits": json.dumps(plain(limits)),
         "contacts": json.dumps(plain(stance.contacts)),
         "model_digest": model_digest(stance),
+        "notes": json.dumps(list(stance.robot.notes)),
     }
 
 

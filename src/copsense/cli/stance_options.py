@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import limits_option
+from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
@@ -72,8 +73,15 @@ def stance_options(command: F) -> F:
             "preset has its own.",
         ),
         click.option(
+            "--base-rpy",
+            metavar="ROLL:PITCH:YAW",
+            help="Orientation of the base to start from (degrees, or with units), where its z axis "
+            "is not up; instead of --base-yaw.",
+        ),
+        click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        load_options,
         limits_option,
     ]
     return with_options(options, command)
@@ -88,7 +96,10 @@ def read_stance(
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
+    base_rpy: str | None,
     width: float | None,
+    loads: tuple[str, ...] = (),
+    payloads: tuple[str, ...] = (),
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -104,7 +115,11 @@ def read_stance(
             )
         contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
-    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    source = (
+        robot
+        if robot in PRESETS
+        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
+    )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     named = any(":" in text for text in contacts)
@@ -112,15 +127,16 @@ def read_stance(
     # Which unit a bare number has depends on the joint.
     positions = read_positions(posture, model) if model is not None else {}
     frames = model.frame_names if model is not None else ()
-    return load_stance(
+    stance = load_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=positions,
-        base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
+        base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
     )
+    return put_loads(stance, loads, payloads)
 
 
 def _read_contacts(
@@ -158,6 +174,11 @@ def _read_contacts(
     return list(contacts) or None
 
 
+def _possible_frames(texts: tuple[str, ...]) -> list[str]:
+    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
+    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
+
+
 def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:
     """``FRAME[:KIND]`` taken apart: names may hold colons themselves, as in ``robot::l_foot``.
 
@@ -183,6 +204,22 @@ def _raised(contact: Contact, height: float) -> Contact:
 
     x, y, z = (float(c) * height for c in contact.rotation[:, 2])
     return replace(contact, offset=(x, y, z))
+
+
+def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:
+    """``--base-yaw`` or ``--base-rpy`` as roll, pitch, yaw [rad]."""
+    if text is None:
+        return None if yaw is None else (0.0, 0.0, yaw)
+    if yaw is not None:
+        raise InvalidInputError("--base-rpy holds the yaw as well as --base-yaw. Give one.")
+    try:
+        roll, pitch, yaw = (read_quantity(angle, "rad") for angle in text.split(":"))
+    except ValueError:
+        raise InvalidInputError(
+            f"the orientation {text!r} is not understood. Give ROLL:PITCH:YAW (degrees), such as "
+            "90:0:0."
+        ) from None
+    return roll, pitch, yaw
 
 
 def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:
