@@ -21,6 +21,7 @@ INTERNAL = (
     "copsense.batch",
     "copsense.comparison.plan_file",
     "copsense.maps.reduction",
+    "copsense.mjcf",
     "copsense.paper",
     "copsense.plots.reading",
     "copsense.quadratic",

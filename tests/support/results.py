@@ -26,6 +26,7 @@ from copsense.maps.marginals import Marginal
 from copsense.maps.sampling import Axis, Grid
 from copsense.margins import margin_table
 from copsense.path import LateralPath
+from copsense.pushes import push_limits
 from copsense.robots import PRESETS
 from copsense.scan import limit_travel, next_active_set_change
 from copsense.simulation import ModelError, Scenario
@@ -99,6 +100,7 @@ def all_results(icub) -> dict[str, object]:
         "margin": icub.contacts[0].sole.margin((0.0, 0.0)),
         "analysis": copsense.analyse(bar, None, copsense.Limits()),
         "regions": copsense.com_regions(icub, [LENGTH], LIMITS, tolerance=1e-2),
+        "pushes": push_limits(icub, "chest", [LENGTH], LIMITS),
         "design": copsense.design_criterion(path, copsense.Limits(), LENGTHS, grid=2),
         **{f"family {name}": family for name, family in families(icub).items()},
         "sweep": copsense.sweep(path, [TORQUE]),
