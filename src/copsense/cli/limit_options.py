@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F
+from copsense.cli.stance_memory import remembered_stance
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -39,7 +40,8 @@ def read_limits(text: str | None) -> Limits | None:
     from copsense.limits import Limits
 
     if text is None:
-        return None
+        file = remembered_stance()
+        return None if file is None else file.limits
     names = {
         "normal-force": "normal_force",
         "friction": "friction",
