@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from copsense.arrays import finite_number
 from copsense.cli.printing import echo_json
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -68,6 +69,8 @@ def four_bar(
         raise UnknownNameError("criterion of the four-bar", criterion, FOUR_BAR_CRITERIA)
     if not math.isfinite(xi):
         raise InvalidInputError(f"xi must be a finite angle [rad], got {xi}.")
+    for name, value in parameters.items():  # also of those that this criterion does not use
+        finite_number(value, f"--{name.replace('_', '-')}", positive=True)
     own = {k: v for k, v in parameters.items() if k in FOUR_BAR_CRITERIA[criterion].defaults}
     linkage = FourBar(leg_length, rod_length, leg_mass, body_mass)
     solution = solve_four_bar(linkage, xi, criterion, **own)
