@@ -7,10 +7,28 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F
+from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.limits import Limits
+
+
+# What a number means; it may be written with its unit.
+_UNITS: dict[str, Unit] = {
+    "normal-force": "N",
+    "cop-margin": "m",
+    "torsion": "m",
+    "torque": "Nm",
+}
+_EXAMPLES = {
+    "normal-force": "10, 10N or off",
+    "friction": "0.33 or off",
+    "sides": "8",
+    "cop-margin": "0.005, 5mm or off",
+    "torsion": "0.013, 13mm, cone or off",
+    "torque": "30, 30Nm, model or off",
+}
 
 
 def limits_option(command: F) -> F:
@@ -65,8 +83,11 @@ def _limit_value(name: str, value: str) -> float | int | str | None:
     }.get(name, ()):
         return value
     try:
-        return int(value) if name == "sides" else float(value)
+        if name == "sides":
+            return int(value)
+        unit = _UNITS.get(name)
+        return float(value) if unit is None else read_quantity(value, unit)
     except ValueError:
         raise InvalidInputError(
-            f"the limit {name}={value!r} is not a number. Write, say, {name}=8 or {name}=off."
+            f"the limit {name}={value!r} is not a number. Write, say, {name}={_EXAMPLES[name]}."
         ) from None
