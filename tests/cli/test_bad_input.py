@@ -55,7 +55,7 @@ from copsense.files import load_configurations
         ("balance icub --reference sine:20mm:1s", "Give hold, sine:AMPLITUDE"),
         ("balance icub --reference ramp:1:2:3", "Give hold, sine:AMPLITUDE"),
         ("balance icub --push 0:40mm:0", "Give FX:FY:FZ"),
-        ("balance icub --payload chest=1m", "Give FRAME=KG"),
+        ("balance icub --unknown-payload chest=1m", "Give FRAME=KG"),
         ("balance icub --torque-limit 20N", "Give Nm, model or JOINT=NM"),
         ("analyse icub --limits cop-margin=5deg", "Write, say, cop-margin=0.005, 5mm or off"),
         ("analyse icub --limits torque=5N", "Write, say, torque=30, 30Nm, model or off"),

@@ -3,11 +3,13 @@
 import math
 from dataclasses import fields
 
+import click
 import numpy as np
 import pinocchio as pin
 import pytest
 from support.commands import copsense
 
+import copsense.cli as cli
 from copsense.cli.balance_command import balance
 from copsense.cli.benchmark_command import _trials
 from copsense.cli.disturbance_options import read_disturbances, read_signal
@@ -187,7 +189,7 @@ def test_disturbances_are_read_in_the_unit_they_name():
     typed = {
         "push": ("0:40N:0:500ms:0.1s:chest",),
         "friction": ("0.5:250ms",),
-        "payload": ("chest=1.5kg",),
+        "unknown_payload": ("chest=1.5kg",),
         "mass_error": 0.0,
         "torque_limit": ("l_knee=20Nm",),
         "force_noise": 0.0,
@@ -204,8 +206,8 @@ def test_disturbances_are_read_in_the_unit_they_name():
     read = read_disturbances(typed)
     assert read["pushes"][0] == Push((0.0, 40.0, 0.0), 0.5, 0.1, "chest")
     assert read["friction"][0] == FrictionChange(0.5, 0.25)
-    assert read["model_error"].payloads == {"chest": 1.5}
-    assert read["motors"].torque_limit == {"l_knee": 20.0}
+    assert read["model_error"].payload == {"chest": 1.5}
+    assert read["motors"].limit == {"l_knee": 20.0}
     assert read["motors"].delay == 0.002
     assert read["noise"].position == pytest.approx(math.radians(0.1))
     assert read["noise"].velocity == pytest.approx(math.radians(1.0))
@@ -229,3 +231,10 @@ def test_a_trial_is_read_in_the_unit_it_names():
     assert falls.repeats == 3
     (worse,) = _trials(["velocity_noise:severe=2rad/s"], None, None, quick=False).values()
     assert worse == Breaking("velocity_noise", severe=2.0)
+
+
+@pytest.mark.parametrize("name", cli.copsense.list_commands(click.Context(cli.copsense)))
+def test_no_command_has_two_options_of_one_name(name):
+    command = cli.copsense.get_command(click.Context(cli.copsense), name)
+    names = [name for parameter in command.params for name in parameter.opts]
+    assert len(names) == len(set(names))

@@ -34,7 +34,7 @@ def disturbance_options(command: F) -> F:
             help="The ground's friction from START [s] on, under one contact or all. Repeatable.",
         ),
         click.option(
-            "--payload",
+            "--unknown-payload",
             multiple=True,
             metavar="FRAME=KG",
             help="A mass on the robot that the controller does not know of. Repeatable.",
@@ -109,7 +109,7 @@ def read_disturbances(options: dict[str, Any]) -> dict[str, Any]:
         "friction": tuple(_read_friction(text) for text in take("friction")),
         "model_error": ModelError(
             take("mass_error") / 100.0,
-            read_assignments(take("payload"), "FRAME=KG, such as chest=1", "kg"),
+            read_assignments(take("unknown_payload"), "FRAME=KG, such as chest=1", "kg"),
         ),
         "motors": Motors(
             take("delay"), take("bandwidth"), _read_torque_limits(take("torque_limit"))
