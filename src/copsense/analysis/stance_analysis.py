@@ -13,6 +13,7 @@ from jaxtyping import Float
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
+from copsense.content import freeze
 from copsense.cop import total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
@@ -64,6 +65,10 @@ class Analysis:
     along: str | None
     notes: tuple[str, ...]
     checked: bool
+
+    def __post_init__(self) -> None:
+        """Own the tangent and the mappings."""
+        freeze(self, "tangent", "sensitivities", "limit_analyses")
 
     @property
     def equilibria(self) -> dict[str, StaticEquilibrium]:

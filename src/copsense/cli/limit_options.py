@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F
+from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.limits import Limits
-
 
 # What a number means; it may be written with its unit.
 _UNITS: dict[str, Unit] = {
@@ -21,13 +21,13 @@ _UNITS: dict[str, Unit] = {
     "torsion": "m",
     "torque": "Nm",
 }
+# Of each limit that can be switched off, what may be written.
 _EXAMPLES = {
-    "normal-force": "10, 10N or off",
-    "friction": "0.33 or off",
-    "sides": "8",
-    "cop-margin": "0.005, 5mm or off",
-    "torsion": "0.013, 13mm, cone or off",
-    "torque": "30, 30Nm, model or off",
+    "normal-force": "5, 5N",
+    "friction": "0.33",
+    "cop-margin": "0.005, 5mm",
+    "torsion": "0.02, 20mm",
+    "torque": "30Nm, torque=model",
 }
 
 
@@ -48,7 +48,8 @@ def read_limits(text: str | None) -> Limits | None:
     from copsense.limits import Limits
 
     if text is None:
-        return None
+        file = remembered_stance()
+        return None if file is None else file.limits
     names = {
         "normal-force": "normal_force",
         "friction": "friction",
@@ -88,6 +89,10 @@ def _limit_value(name: str, value: str) -> float | int | str | None:
         unit = _UNITS.get(name)
         return float(value) if unit is None else read_quantity(value, unit)
     except ValueError:
+        if name == "sides":
+            remedy = "Write a whole number from 3, such as sides=8"
+        else:
+            remedy = f"Write, say, {name}={_EXAMPLES[name]} or {name}=off"
         raise InvalidInputError(
-            f"the limit {name}={value!r} is not a number. Write, say, {name}={_EXAMPLES[name]}."
+            f"the limit {name}={value!r} is not understood. {remedy}."
         ) from None

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from copsense.content import ShortRepr, freeze
 from copsense.json_data import json_data
 from copsense.maps.columns import EVALUATED, STATUS
 from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
@@ -16,8 +17,8 @@ from copsense.maps.store import MapStore
 LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
 
 
-@dataclass(frozen=True)
-class WorstPosture:
+@dataclass(frozen=True, repr=False)
+class WorstPosture(ShortRepr):
     """A posture that is among the worst.
 
     Attributes:
@@ -34,9 +35,13 @@ class WorstPosture:
     contact: str = ""
     tipping_edge: int = -1
 
+    def __post_init__(self) -> None:
+        """Own the coordinates."""
+        freeze(self, "coordinates")
 
-@dataclass(frozen=True)
-class FailedPosture:
+
+@dataclass(frozen=True, repr=False)
+class FailedPosture(ShortRepr):
     """The first posture that was not evaluated, of those of one status.
 
     Attributes:
@@ -49,9 +54,13 @@ class FailedPosture:
     coordinates: Mapping[str, float]
     reason: str
 
+    def __post_init__(self) -> None:
+        """Own the coordinates."""
+        freeze(self, "coordinates")
 
-@dataclass(frozen=True)
-class CriterionSummary:
+
+@dataclass(frozen=True, repr=False)
+class CriterionSummary(ShortRepr):
     """A map under one criterion.
 
     Attributes:
@@ -71,9 +80,13 @@ class CriterionSummary:
     gain_percentiles: Mapping[float, float]
     failed: Mapping[str, FailedPosture]
 
+    def __post_init__(self) -> None:
+        """Own the mappings."""
+        freeze(self, "counts", "travel_percentiles", "gain_percentiles", "failed")
 
-@dataclass(frozen=True)
-class MapSummary:
+
+@dataclass(frozen=True, repr=False)
+class MapSummary(ShortRepr):
     """A map in a few numbers.
 
     Attributes:
@@ -95,6 +108,10 @@ class MapSummary:
     chunks: int
     chunks_done: int
     criteria: Mapping[str, CriterionSummary]
+
+    def __post_init__(self) -> None:
+        """Own the mapping."""
+        freeze(self, "criteria")
 
     @property
     def complete(self) -> bool:
