@@ -60,6 +60,7 @@ class Robot:
         notes: what its description says and copsense does not use, a sentence each; every command
             prints them.
         drives: which joints have motors, springs and couplings, and the loops among its links.
+        payloads: masses that `with_payload` fixed to it; its model holds them already.
         mjcf: what was read from an MJCF, with every joint of the file; None for other robots.
     """
 
@@ -68,6 +69,7 @@ class Robot:
     description: Description | None = None
     notes: tuple[str, ...] = ()
     drives: Drives = field(default_factory=Drives)
+    payloads: tuple[Payload, ...] = ()
     mjcf: MjcfReading | None = None
 
     def __post_init__(self) -> None:
@@ -238,7 +240,8 @@ class Robot:
         model.appendBodyToJoint(
             at.parentJoint, pin.Inertia(kg, np.array(place), np.array(about)), at.placement
         )
-        return replace(self, model=model)
+        payload = Payload(frame, kg, tuple(float(c) for c in place))  # type: ignore[arg-type]
+        return replace(self, model=model, payloads=(*self.payloads, payload))
 
     @classmethod
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
@@ -534,6 +537,21 @@ class Robot:
     def __repr__(self) -> str:
         """Name, joints and mass."""
         return f"Robot({self.name!r}, {len(self.dof_names)} joints, {self.mass:.4g} kg)"
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A mass fixed to a robot.
+
+    Attributes:
+        frame: name of the frame that carries it.
+        mass: [kg].
+        com: its centre of mass in the frame [m].
+    """
+
+    frame: str
+    mass: float
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,16 @@ from jaxtyping import Float
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
+from copsense.content import freeze
 from copsense.cop import total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.freedom import freedom_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
-from copsense.robots import sole_notes
+from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import (
@@ -63,6 +65,10 @@ class Analysis:
     along: str | None
     notes: tuple[str, ...]
     checked: bool
+
+    def __post_init__(self) -> None:
+        """Own the tangent and the mappings."""
+        freeze(self, "tangent", "sensitivities", "limit_analyses")
 
     @property
     def equilibria(self) -> dict[str, StaticEquilibrium]:
@@ -239,6 +245,8 @@ def analyse(
         *here.robot.notes,
         *tied,
         *_limit_notes(here, within, limited),
+        *freedom_notes(here),
+        *plausibility_notes(here),
         *sole_notes(here),
         *joint_limit_notes(here),
     )
