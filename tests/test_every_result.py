@@ -25,6 +25,7 @@ INTERNAL = (
     "copsense.paper",
     "copsense.plots.reading",
     "copsense.quadratic",
+    "copsense.robots.stance_file",  # a file that is being read
     "copsense.statics.program",
 )
 IN_THE_LOOP = {"Command", "Observation", "Snapshot", "Target"}  # good until the next step

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from copsense.content import ShortRepr, freeze
+from copsense.json_data import json_data
 from copsense.maps.columns import EVALUATED, STATUS
 from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
 from copsense.maps.store import MapStore
@@ -115,6 +117,29 @@ class MapSummary(ShortRepr):
     def complete(self) -> bool:
         """Whether every chunk is done."""
         return self.chunks_done == self.chunks
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense map --json`` prints: plain data, None for what is infinite."""
+        data: dict[str, Any] = {
+            "robot": self.robot,
+            "output": self.path,
+            "coordinates": dict(zip(self.coordinates, self.units, strict=True)),
+            "postures": self.postures,
+            "complete": self.complete,
+            "criteria": {
+                name: {
+                    "counts": row.counts,
+                    "share": {k: n / self.postures for k, n in row.counts.items()},
+                    "worst_travel": [asdict(w) for w in row.worst_travel],
+                    "worst_gain": [asdict(w) for w in row.worst_gain],
+                    "travel_percentiles": row.travel_percentiles,
+                    "gain_percentiles": row.gain_percentiles,
+                    "failed": {status: asdict(first) for status, first in row.failed.items()},
+                }
+                for name, row in self.criteria.items()
+            },
+        }
+        return dict(json_data(data))
 
 
 def summarise(store: MapStore, progress: Callable[[int], object] | None = None) -> MapSummary:
