@@ -57,6 +57,13 @@ def stance_options(command: F) -> F:
             "collision geometry shows it.",
         ),
         click.option(
+            "--soles",
+            type=click.Choice(["collision", "visual"]),
+            default="collision",
+            help="Geometry that soles are read from: what collides (default), or what is drawn, "
+            "for a URDF without collision geometry.",
+        ),
+        click.option(
             "--sole",
             metavar="X0:X1:Y0:Y1",
             help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
@@ -109,6 +116,7 @@ def read_stance(
     robot: str,
     contacts: tuple[str, ...],
     contact_at: Any,
+    soles: Any,
     sole: str | None,
     sole_height: float | None,
     package_dirs: tuple[str, ...],
@@ -126,7 +134,7 @@ def read_stance(
     The robot's notes are printed.
     """
     from copsense.robot import Robot
-    from copsense.robots import PRESETS, load_robot, load_stance
+    from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
     file = remembered_stance()
     if file is not None:
@@ -166,11 +174,13 @@ def read_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
+        soles=soles,
         package_dirs=package_dirs,
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
     )
+    echo_notes(soles_read(stance))
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
     )

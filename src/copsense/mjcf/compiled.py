@@ -17,7 +17,7 @@ from copsense.mjcf.effort import effort_limits
 from copsense.mjcf.gravity import usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
 from copsense.mjcf.scene import find_robot, left_out
-from copsense.mjcf.tree_model import build_tree
+from copsense.mjcf.tree_model import build_tree, pose
 from copsense.mjcf.unused import unused
 
 _UNNAMED = "MuJoCo Model"  # what MuJoCo calls a model without a name
@@ -40,7 +40,8 @@ def read_compiled(description: Description) -> MjcfReading:
     tree.model.lowerEffortLimit = -tree.model.upperEffortLimit
     check_against(mj, tree)
     notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree))
-    return MjcfReading(tree.model, collision_shapes(mj, tree), notes)
+    base = pose(np.zeros(3), mj.body_quat[root]).rotation
+    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, np.array(base))
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -38,8 +38,10 @@ class MjcfReading:
         model: the Pinocchio model, with a floating (or planar) base as its first joint.
         shapes: its collision shapes; None where Pinocchio reads them from the file, if asked.
         notes: what the file says and is not used, a sentence each.
+        base: orientation (3, 3) of the root body in the file's world; None where it is not known.
     """
 
     model: pin.Model
     shapes: tuple[MjcfShape, ...] | None
     notes: tuple[str, ...] = ()
+    base: Float[np.ndarray, "3 3"] | None = None
