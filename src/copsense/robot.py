@@ -43,6 +43,7 @@ _NAMED = (
     pin.FrameType.SENSOR,
 )
 
+_ABSURD = 1e9  # lengths [m] and inertias [kg m^2] of no robot, whatever its units were
 # Effort limits from here on are a modeller's "no limit", not a motor's.
 PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 # Positions beyond this are how a parser writes infinity.
@@ -118,12 +119,14 @@ class Robot:
         bad = [
             model.names[i]
             for i in range(model.njoints)
-            if not (np.all(np.isfinite(numbers[i])) and np.all(np.isfinite(placed[i])))
+            # Comparisons are false for what is not a number.
+            if not (np.all(np.abs(numbers[i]) < _ABSURD) and np.all(np.abs(placed[i]) < _ABSURD))
         ]
         if bad:
             raise InvalidInputError(
                 f"robot {self.name!r} has a centre of mass, inertia or placement that is not "
-                f"finite at {', '.join(bad)}. Correct the model."
+                f"finite, or beyond {_ABSURD:g} m or kg m^2, at {', '.join(bad)}. Correct the "
+                "model."
             )
         if not 0 < np.linalg.norm(model.gravity.linear) < np.inf:
             raise InvalidInputError(

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact
+from copsense.content import ShortRepr, freeze
 from copsense.errors import ModelLoadError
 from copsense.polygon import Polygon
 from copsense.robot import Robot
@@ -20,8 +21,8 @@ _STEEPEST = np.radians(30.0)  # a face that faces down within this may be a tilt
 _TIP = 1 / 6  # share of its foot's outline under which a sole is hardly all of it
 
 
-@dataclass(frozen=True, eq=False)
-class Sole:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sole(ShortRepr):
     """The sole under a frame of the robot's model.
 
     Attributes:
@@ -49,6 +50,10 @@ class Sole:
         """Whether it is so small beside its foot that it may be a tip or an edge of it alone."""
         outline = Polygon(self.polygon)
         return len(outline) > 2 and outline.area < _TIP * self.footprint[0] * self.footprint[1]
+
+    def __post_init__(self) -> None:
+        """Own the polygon."""
+        freeze(self, "polygon")
 
 
 def read_sole(

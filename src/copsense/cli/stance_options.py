@@ -133,6 +133,7 @@ def read_stance(
 
     The robot's notes are printed.
     """
+    from copsense.description import check_package_dirs
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
@@ -149,8 +150,10 @@ def read_stance(
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
     if not robot:
         raise InvalidInputError(
-            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE; "
+            "see --help."
         )
+    check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
         if contact_at == "sole":
             raise InvalidInputError(

@@ -10,6 +10,9 @@ A solver finds which rows hold; with these held the optimum solves
 
 whose solution is then held against every optimality condition. If one fails, a second solver of
 another kind names the rows; if that fails too, an error says so.
+
+This is what to call for wrenches that are reported and differentiated. `qp` is beneath it: call
+that where the solver's own precision is enough, in a control loop or for a linear program.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
+from copsense.content import ShortRepr
 from copsense.errors import CopsenseError, UnsolvedError
 from copsense.statics import qp
 
@@ -48,8 +52,8 @@ class NoPointError(CopsenseError):
         super().__init__(f"infeasible by {violation:.3g}")
 
 
-@dataclass(frozen=True, eq=False)
-class Optimum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimum(ShortRepr):
     """The optimum of a program.
 
     Attributes:
@@ -65,8 +69,8 @@ class Optimum:
     error: float
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(ShortRepr):
     """A strictly convex quadratic program (on the null space of E').
 
     Attributes:
@@ -89,6 +93,10 @@ class Program:
     b: Float[np.ndarray, " r"]
     unit: float
     tolerance: float = 1e-8
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: systems are factorised again where they are needed."""
+        return {k: v for k, v in self.__dict__.items() if k != "_systems"}
 
     @cached_property
     def scale(self) -> Float[np.ndarray, " r"]:
