@@ -157,8 +157,6 @@ def _unexpanded(name: str, left: tuple[str, ...]) -> ModelLoadError:
 
 
 def _mjcf_faults(root: ET.Element) -> Iterator[str]:
-    if root.find("worldbody/body") is None and root.find(".//include") is None:
-        yield "its <worldbody> has no <body>"
     for body in root.iterfind("worldbody//body"):
         where = f"body {body.get('name', '')!r}"
         for element in [body, *body.findall("inertial"), *body.findall("joint")]:

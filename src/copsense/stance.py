@@ -30,11 +30,16 @@ from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads,
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
-# Singular values of the contact Jacobian, lengths in metres, below which a direction is lost.
-RANK_TOLERANCE = 1e-9
+# Singular values of the contact Jacobian, lengths in metres, below which a direction is lost. A
+# posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
+# without ankle roll do, its singular value is then known to the root of that.
+RANK_TOLERANCE = 1e-6
+# Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
+_CURVED = 1e-4
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
+_FOLDED = 1e-2  # the same where the contacts hold motions to second order only
 _APART = 1e-3  # from here on the CoM's two directions are far from depending on each other
 # How far a contact may lie from its stated plane.
 POSITION_TOLERANCE = 1e-6  # m
@@ -96,8 +101,7 @@ class Stance:
         if check:
             for k, contact in enumerate(contacts):
                 _check_plane(contact, feet[k])
-            if not any(contact.kind == "surface" for contact in contacts):
-                _check_support(self)
+            check_support(self)
             if self.closures is not None:
                 _check_closed(self.closures)
 
@@ -299,15 +303,55 @@ class Stance:
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
         """Orthonormal basis Z of the velocities that move no contact and open no loop: J Z = 0.
 
-        Joints that hang follow as gravity and their springs tell them.
+        Without the `false_motions`, which J alone would allow. Joints that hang follow as gravity
+        and their springs tell them.
         """
         Z = self._svd[2][self.rank :].T.copy()
+        count = self.false_motions.shape[1]
+        if count:
+            Z = Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T
         if not self.hanging:
             return Z
         rows = self.hanging_derivative @ Z
         _, s, vt = np.linalg.svd(rows)
         lost = int(np.sum(s > CLOSURE_RANK * max(s.max(initial=0.0), self.robot.weight * 1e-3)))
         return np.asarray(Z @ vt[lost:].T)
+
+    @array_property
+    def false_motions(self) -> Float[np.ndarray, "nv k"]:
+        """Orthonormal motions v with J v = 0 that can be followed to first order only.
+
+        Where J is deficient, y' J = 0, a motion moves the contacts by v' Q v / 2 along y to second
+        order, Q = d(J' y)/dq. Where Q is definite on some motions and zero on the others, as for
+        the pelvis' roll on two legs without ankle roll, those cannot be followed at all.
+        """
+        return self._folds[0]
+
+    @property
+    def fold_equations(self) -> tuple[Float[np.ndarray, "k nv"], Float[np.ndarray, " k"]]:
+        """Rows F and errors e, F dq = -e, by which J comes to be deficient along `false_motions`.
+
+        Contacts that hold a motion to second order are in place where e = 0, and Newton's method on
+        them alone only halves its error.
+        """
+        return self._folds[1:]
+
+    @cached_property
+    def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        u, _, vt = self._svd
+        Z = vt[self.rank :].T
+        motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
+        for y in u[:, self.rank :].T:
+            turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
+            values, vectors = np.linalg.eigh(Z.T @ (turned + turned.T) @ Z / 2)
+            curved = np.abs(values) > _CURVED
+            if curved.any() and (np.all(values[curved] > 0) or np.all(values[curved] < 0)):
+                false = Z @ vectors[:, curved]
+                motions.append(false)
+                rows.append(false.T @ turned)
+                errors.append(false.T @ self.constraints.T @ y)
+        left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
+        return left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
 
     @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:
@@ -342,7 +386,8 @@ class Stance:
         if area > _APART * (a + c) ** 2:
             inverse = np.array([[c, -b], [-b, a]]) / area
             return np.asarray(motions.dot(speeds.T).dot(inverse))
-        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=_LOST))
+        lost = _FOLDED if self.false_motions.shape[1] else _LOST
+        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=lost))
 
     @property
     def redundant_directions(self) -> tuple[str, ...]:
@@ -600,15 +645,24 @@ def _check_closed(closures: Closures) -> None:
         )
 
 
-def _check_support(stance: Stance) -> None:
-    """Reject contacts that cannot balance the base. A surface contact always can."""
+def check_support(stance: Stance) -> None:
+    """Reject contacts that cannot balance the base. A surface contact always can.
+
+    Raises:
+        InsufficientContactsError: a force or moment on the base is beyond them.
+    """
+    if any(contact.kind == "surface" for contact in stance.contacts):
+        return
     nb = stance.robot.base_nv
     base = stance.jacobian[:, :nb]
     rank = np.linalg.matrix_rank(base, tol=RANK_TOLERANCE * max(1.0, np.abs(base).max()))
     if rank < nb:
         kinds = ", ".join(f"{c.name} ({c.kind})" for c in stance.contacts)
+        two = [c.kind for c in stance.contacts] == ["point", "point"]
         raise InsufficientContactsError(
             f"the contacts of {stance.robot.name!r} ({kinds}) cannot balance every force and "
-            f"moment on its base: they span {rank} of {nb} directions. Use at least one surface "
-            "contact, or three point contacts that are not on one line."
+            f"moment on its base: they span {rank} of {nb} directions"
+            + (", as two points carry no moment about the line through them" if two else "")
+            + ". Use at least one surface contact, or three point contacts that are not on one "
+            "line."
         )

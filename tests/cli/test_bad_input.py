@@ -33,7 +33,7 @@ from copsense.files import load_configurations
         ("analyse icub --posture =3", "Give JOINT=POSITION"),
         ("analyse icub --joint l_knee=inf", "the position of joint 'l_knee' is inf"),
         ("analyse icub --joint l_nee=5", "Did you mean l_knee"),
-        ("analyse icub --base-yaw nan", "base_rpy (--base-yaw)"),
+        ("analyse icub --base-yaw nan", "base_rpy (--base-yaw, --base-rpy)"),
         ("analyse icub --along l_hip_rol", "Did you mean l_hip_roll"),
         ("analyse icub --contact l_soul", "Did you mean l_sole"),
         ("analyse icub --contact l_sole:surfce", "Did you mean surface"),

@@ -16,11 +16,12 @@ from copsense.analysis.verdicts import verdict
 from copsense.cop import total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.freedom import freedom_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
-from copsense.robots import sole_notes
+from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import (
@@ -239,6 +240,8 @@ def analyse(
         *here.robot.notes,
         *tied,
         *_limit_notes(here, within, limited),
+        *freedom_notes(here),
+        *plausibility_notes(here),
         *sole_notes(here),
         *joint_limit_notes(here),
     )

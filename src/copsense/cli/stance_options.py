@@ -73,6 +73,12 @@ def stance_options(command: F) -> F:
             "preset has its own.",
         ),
         click.option(
+            "--base-rpy",
+            metavar="ROLL:PITCH:YAW",
+            help="Orientation of the base to start from (degrees, or with units), where its z axis "
+            "is not up; instead of --base-yaw.",
+        ),
+        click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
         load_options,
@@ -90,6 +96,7 @@ def read_stance(
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
+    base_rpy: str | None,
     width: float | None,
     loads: tuple[str, ...] = (),
     payloads: tuple[str, ...] = (),
@@ -126,7 +133,7 @@ def read_stance(
         contact_at=contact_at,
         package_dirs=package_dirs,
         posture=positions,
-        base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
+        base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
     )
     return put_loads(stance, loads, payloads)
@@ -197,6 +204,22 @@ def _raised(contact: Contact, height: float) -> Contact:
 
     x, y, z = (float(c) * height for c in contact.rotation[:, 2])
     return replace(contact, offset=(x, y, z))
+
+
+def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:
+    """``--base-yaw`` or ``--base-rpy`` as roll, pitch, yaw [rad]."""
+    if text is None:
+        return None if yaw is None else (0.0, 0.0, yaw)
+    if yaw is not None:
+        raise InvalidInputError("--base-rpy holds the yaw as well as --base-yaw. Give one.")
+    try:
+        roll, pitch, yaw = (read_quantity(angle, "rad") for angle in text.split(":"))
+    except ValueError:
+        raise InvalidInputError(
+            f"the orientation {text!r} is not understood. Give ROLL:PITCH:YAW (degrees), such as "
+            "90:0:0."
+        ) from None
+    return roll, pitch, yaw
 
 
 def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:

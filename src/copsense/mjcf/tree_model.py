@@ -68,7 +68,6 @@ def build_tree(mj: Any, root: int) -> Tree:
     """
     model = pin.Model()
     tree = Tree(model, root, base_joints(mj, root))
-    model.gravity = pin.Motion(np.array(mj.opt.gravity), np.zeros(3))
     owners: list[int | None] = [None]  # MuJoCo's joint behind each of Pinocchio's
     frames: dict[int, int] = {}  # of each body
     for body in _depth_first(mj, root):

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from copsense.mjcf.scene import body_label, listed
 from copsense.mjcf.tree_model import Tree, actuators_of
@@ -17,13 +16,12 @@ _COUPLING = {
     int(mujoco.mjtEq.mjEQ_JOINT): int(mujoco.mjtObj.mjOBJ_JOINT),
     int(mujoco.mjtEq.mjEQ_TENDON): int(mujoco.mjtObj.mjOBJ_TENDON),
 }
-_FAR_OFF = 1e-6  # of gravity's size: how much of it may not be vertical
 
 
 def unused(mj: Any, tree: Tree) -> tuple[str, ...]:
     """A sentence for each kind of thing that is passed over."""
     return (
-        *_gravity(mj, tree),
+        *_lifted(mj, tree),
         *_equalities(mj, tree),
         *_springs(mj, tree),
         *_motors(mj, tree),
@@ -31,15 +29,7 @@ def unused(mj: Any, tree: Tree) -> tuple[str, ...]:
     )
 
 
-def _gravity(mj: Any, tree: Tree) -> Iterator[str]:
-    gravity = np.array(mj.opt.gravity)
-    size = float(np.linalg.norm(gravity))
-    if size and (gravity[2] > 0 or np.abs(gravity[:2]).max() > _FAR_OFF * size):
-        numbers = " ".join(f"{g:g}" for g in gravity)
-        yield (
-            f"gravity in the file is {numbers} m/s^2, not straight down: the weight acts along it, "
-            "while the ground is level and z is up."
-        )
+def _lifted(mj: Any, tree: Tree) -> Iterator[str]:
     lifted = [b for b in tree.bodies if mj.body_gravcomp[b]]
     if lifted:
         names = listed(body_label(mj, b) for b in lifted)
