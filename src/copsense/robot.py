@@ -259,7 +259,8 @@ class Robot:
             return cls(name or model.name or "robot", model, description, notes, found.drives)
         read = read_mjcf(description)
         notes = (*description.notes, *read.notes)
-        return cls(name or read.model.name or "robot", read.model, description, notes, mjcf=read)
+        title = name or read.model.name or "robot"
+        return cls(title, read.model, description, notes, read.drives, read)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.

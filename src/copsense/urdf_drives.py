@@ -1,8 +1,8 @@
 """URDF drives: couplings, loops and joints without motors, as a URDF describes them.
 
-    <mimic>          the joint follows another
-    <loop_joint>     two links are joined (Drake's, and Isaac's, element)
-    <transmission>   the joints of a limb that has some, and are in none, have no motor
+<mimic>          the joint follows another
+<loop_joint>     two links are joined (Drake's, and Isaac's, element)
+<transmission>   the joints of a limb that has some, and are in none, have no motor
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ class _Reader:
 
     def couplings(self) -> tuple[Coupling, ...]:
         """Joints that mimic others; those that mimic what cannot move are locked."""
-        mimics, idle, several, lost = [], [], [], []
+        mimics: list[Coupling] = []
+        several = []
         for joint in self.root.findall("joint"):
             mimic, name = joint.find("mimic"), joint.get("name", "")
             if mimic is None:
@@ -87,8 +88,8 @@ class _Reader:
                 _numbers(mimic, "offset", "0")[0],
             )
             if name not in self.moving:
-                idle.append(name)
-            elif not self._single(name):
+                continue  # a fixed joint, which stays where it is whatever it mimics
+            if not self._single(name):
                 several.append(name)
             else:
                 mimics.append(found)
@@ -99,13 +100,10 @@ class _Reader:
             before = len(waiting)
             held |= {c.joint: c.ratio * held[c.of] + c.offset for c in waiting if c.of in held}
             waiting = [c for c in waiting if c.joint not in held]
-        kept = []
-        for c in waiting:
-            (kept if self._single(c.of) else lost).append(c)
+        kept = [c for c in waiting if self._single(c.of)]
+        lost = [c for c in waiting if c not in kept]
         locked = {c.joint: held[c.joint] for c in mimics if c.joint in held}
         self._lock(locked)
-        if idle:
-            self.notes.append(f"The <mimic> of joints that are fixed ({_listed(idle)}) is not used.")
         if locked:
             at = _listed(f"{joint} at {value:g}" for joint, value in locked.items())
             self.notes.append(f"Joints that mimic a fixed joint do not move: {at} (rad or m).")
@@ -159,9 +157,7 @@ class _Reader:
             self.notes.append(f"{_listed(dict.fromkeys(unused))} in the file is not used.")
         return tuple(found)
 
-    def _loop(
-        self, element: ET.Element, name: str, kind: LoopKind, ends: list[ET.Element]
-    ) -> Loop:
+    def _loop(self, element: ET.Element, name: str, kind: LoopKind, ends: list[ET.Element]) -> Loop:
         (frame_a, offset_a), (frame_b, offset_b) = (
             self._end(end, f"{name}_{k}") for k, end in enumerate(ends, 1)
         )
@@ -194,8 +190,9 @@ class _Reader:
     def motors(self, couplings: tuple[Coupling, ...]) -> tuple[str, ...] | None:
         """Names of the motors, or None where every joint that leads has one.
 
-        A <transmission> tells which joints a controller drives. Vendors of arms and of sensors put
-        them into files of robots whose other limbs have none: these keep their motors.
+        A <transmission> tells which joints a controller drives. Vendors of arms and of grippers put
+        theirs into files of robots whose other joints have none: limbs whose first joint is in no
+        transmission are not described by them, and keep their motors.
         """
         driven: set[str] = set()
         for transmission in self.root.findall("transmission"):
@@ -215,15 +212,16 @@ class _Reader:
             while joint in followers:  # who drives a follower drives whom it follows
                 joint = followers[joint]
             driven.add(joint)
-        idle, untold = [], []
+        idle: list[str] = []
+        untold: list[str] = []
         for limb in self._limbs():
             left = [j for j in limb if j not in driven and j not in followers]
-            (idle if driven.intersection(limb) else untold).extend(left)
+            (idle if limb[0] in driven else untold).extend(left)
         if untold:
             self.notes.append(
-                f"Joints {_listed(untold)} are of limbs without any <transmission>, while others "
-                "have some; they are taken to have motors. passive=[...] (--passive JOINT) takes "
-                "them away."
+                f"Joints {_listed(untold)} have no <transmission>, nor has the first of their "
+                "limb, while others have; they are taken to have motors. passive=[...] (--passive "
+                "JOINT) takes them away."
             )
         if not idle:
             return None
@@ -244,9 +242,7 @@ class _Reader:
         count = self.model.joints[self.model.getJointId(joint)].nv
         return [joint] if count == 1 else [f"{joint}[{i}]" for i in range(count)]
 
-    def note_efforts(
-        self, couplings: tuple[Coupling, ...], motors: tuple[str, ...] | None
-    ) -> None:
+    def note_efforts(self, couplings: tuple[Coupling, ...], motors: tuple[str, ...] | None) -> None:
         """Name the joints whose motor may exert nothing, according to the file."""
         followers = {c.joint for c in couplings}
         zero = []
@@ -259,8 +255,8 @@ class _Reader:
                 zero.append(name)
         if zero:
             self.notes.append(
-                f'Joints {_listed(zero)} have effort="0", which is taken as no limit known. If they '
-                "have no motor, say so with passive=[...] (--passive JOINT)."
+                f'Joints {_listed(zero)} have effort="0", which is taken as no limit known. If '
+                "they have no motor, say so with passive=[...] (--passive JOINT)."
             )
 
 

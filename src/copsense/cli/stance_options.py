@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
@@ -81,6 +82,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        drive_options,
         load_options,
         limits_option,
     ]
@@ -100,6 +102,7 @@ def read_stance(
     width: float | None,
     loads: tuple[str, ...] = (),
     payloads: tuple[str, ...] = (),
+    **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -135,6 +138,7 @@ def read_stance(
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
+        drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
     return put_loads(stance, loads, payloads)
 
