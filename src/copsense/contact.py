@@ -11,6 +11,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_array
+from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
 from copsense.polygon import Polygon
 from copsense.rigid_body import Attachment
@@ -65,8 +66,8 @@ class Plane:
         return np.column_stack([x, np.cross(z, x), z])
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
+@dataclass(frozen=True, eq=False, repr=False)
+class Contact(ShortRepr):
     """A contact between a link of the robot and a plane of the environment.
 
     The **contact frame** is the model's frame moved by `placement`: origin on the contact plane,

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import finite_array, finite_number, owned, read_only
+from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 
 LoopKind = Literal["ball", "pin", "weld"]
@@ -105,8 +106,8 @@ class Loop:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class Transmission:
+@dataclass(frozen=True, eq=False, repr=False)
+class Transmission(ShortRepr):
     """Motors that drive several joints together: joint torques = matrix @ motor torques.
 
     Attributes:
@@ -148,8 +149,8 @@ class Transmission:
             object.__setattr__(self, "effort_limits", limits)
 
 
-@dataclass(frozen=True, eq=False)
-class Drives:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drives(ShortRepr):
     """What holds a robot's joints.
 
     Attributes:
@@ -178,7 +179,7 @@ class Drives:
             object.__setattr__(self, "motors", tuple(self.motors))
         for name in ("couplings", "loops", "transmissions"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        object.__setattr__(self, "springs", dict(self.springs))
+        object.__setattr__(self, "springs", FrozenMapping(self.springs))
         for joint, spring in self.springs.items():
             if not isinstance(spring, Spring):
                 raise InvalidInputError(
@@ -188,7 +189,7 @@ class Drives:
             joint: finite_number(torque, f"the torque held on joint {joint!r}")
             for joint, torque in self.held.items()
         }
-        object.__setattr__(self, "held", held)
+        object.__setattr__(self, "held", FrozenMapping(held))
         followers = [coupling.joint for coupling in self.couplings]
         _reject_twice(followers, "follows two joints")
         driven = [joint for each in self.transmissions for joint in each.joints]
@@ -308,8 +309,8 @@ class Drives:
         return Actuation(motors, np.array([c for _, _, c in columns]).reshape(-1, len(names)).T)
 
 
-@dataclass(frozen=True, eq=False)
-class Actuation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Actuation(ShortRepr):
     """Which joint torques the motors can exert: S t_m, and what they cannot.
 
     Attributes:

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from copsense.arrays import array_property, finite_number, owned, read_only
 from copsense.contact import Contact
-from copsense.content import ByContent, own, plain, show
+from copsense.content import ByContent, ShortRepr, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
@@ -150,8 +150,8 @@ def _of(limit: float | Mapping[str, float] | None, contact: Contact) -> float | 
 NO_LIMITS = Limits(normal_force=None, friction=None, cop_margin=None, torsion=None)
 
 
-@dataclass(frozen=True, eq=False)
-class LimitRows:
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitRows(ShortRepr):
     """Limits at a stance. Contact rows are constant along a path, torque limits are not.
 
     Attributes:

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
+from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError
 
 _ROUNDING = 1e-12  # m: how far beyond a line a vertex may be and still be on it
@@ -26,8 +27,8 @@ _AXES = {"x": 0, "y": 1}
 Pair = Sequence[float]
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeMargin:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgeMargin(ShortRepr):
     """Distance of a point to the nearest edge of a polygon.
 
     Attributes:
@@ -41,6 +42,10 @@ class EdgeMargin:
     edge: int
     side: str
     normal: Float[np.ndarray, " 2"]
+
+    def __post_init__(self) -> None:
+        """Own the normal."""
+        freeze(self, "normal")
 
 
 @dataclass(frozen=True, eq=False)

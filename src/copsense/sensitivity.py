@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from copsense.arrays import array_property, finite_array, finite_number, owned, read_only
+from copsense.arrays import array_property, finite_array, finite_number, read_only
+from copsense.content import freeze
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
@@ -28,10 +29,11 @@ from copsense.statics import (
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 _STILL = 1e-12  # gains under which nothing moves
+_LISTED = 6  # contacts that the representation lists
 _ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CopSensitivity:
     """The static centre-of-pressure sensitivity of a stance ([Romano2016] Eq. (11)).
 
@@ -53,8 +55,20 @@ class CopSensitivity:
 
     def __post_init__(self) -> None:
         """Own the arrays."""
-        for name in ("cop", "matrix", "wrench_derivative", "torque_derivative"):
-            object.__setattr__(self, name, owned(getattr(self, name)))
+        freeze(self, "basis", "cop", "matrix", "wrench_derivative", "torque_derivative")
+
+    def __repr__(self) -> str:
+        """The equilibrium, and where each contact's CoP is and how it moves with the CoM."""
+        names = self.equilibrium.stance.contact_names
+        lines = [
+            f"  {name}: CoP ({x * 1e3:.1f}, {y * 1e3:.1f}) mm, |dCoP/dCoM| {gain:.3f}"
+            for name, (x, y), gain in zip(
+                names, self.cop, np.linalg.norm(self.com_gain, 2, axis=(1, 2)), strict=True
+            )
+        ]
+        if len(lines) > _LISTED:
+            lines[_LISTED:] = [f"  and {len(names) - _LISTED} more contacts"]
+        return "\n".join([f"CopSensitivity of {self.equilibrium!r}", *lines])
 
     @array_property
     def gradient(self) -> Float[np.ndarray, "nc 2 nv"]:

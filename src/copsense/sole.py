@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact
+from copsense.content import ShortRepr, freeze
 from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.meshes import find_mesh
@@ -25,8 +26,8 @@ _STEEPEST = np.radians(30.0)  # a face that faces down within this may be a tilt
 _RIM = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)  # samples of a round rim
 
 
-@dataclass(frozen=True, eq=False)
-class Sole:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sole(ShortRepr):
     """The sole under a frame of the robot's model.
 
     Attributes:
@@ -40,6 +41,10 @@ class Sole:
     height: float
     polygon: Float[np.ndarray, "k 2"]
     tilt: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Own the polygon."""
+        freeze(self, "polygon")
 
 
 def read_sole(robot: Robot, contact: Contact, *, thickness: float = THICKNESS) -> Sole:

@@ -351,7 +351,8 @@ class Stance:
                 rows.append(false.T @ turned)
                 errors.append(false.T @ self.constraints.T @ y)
         left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
-        return left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
+        found = left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
+        return read_only(found[0]), read_only(found[1]), read_only(found[2])
 
     @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:

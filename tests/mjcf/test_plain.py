@@ -50,6 +50,10 @@ SIMPLE = {
     "a keyframe": {
         "tail": "<keyframe><key name='k' qpos='0 0 1 1 0 0 0 .1 .2 .3 .4 .5 0 0 0 0 0'/></keyframe>"
     },
+    "a keyframe of a base that is fixed": {
+        "base": "",
+        "tail": "<keyframe><key name='k' qpos='.1 .2 .3 .4 .5 0 0 0 0 0'/></keyframe>",
+    },
     "a joint's place": {
         "left": LEG.format(side="l", y=0.1, foot="<geom size='.1'/>").replace(
             "name='l_knee'", "name='l_knee' pos='.01 .02 .03'"

@@ -13,6 +13,7 @@ from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
+from copsense.cli.stance_memory import remember_stance, remembered_stance, written
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -24,7 +25,24 @@ if TYPE_CHECKING:
 def stance_options(command: F) -> F:
     """The robot, how it stands, and what it must respect."""
     options = [
-        click.argument("robot"),
+        click.argument("robot", required=False, default=""),
+        click.option(
+            "--stance",
+            "stance_file",
+            metavar="FILE",
+            expose_value=False,
+            is_eager=True,
+            callback=remember_stance,
+            help="A stance file (.toml) instead of ROBOT: robot, contacts, configuration, loads "
+            "and drives, and the limits and criteria to use unless options give others.",
+        ),
+        click.option(
+            "--save-stance",
+            metavar="FILE",
+            help="Write the stance down, with the limits and criteria, for --stance and "
+            "copsense.load_stance.",
+        ),
+        click.option("--force-stance", is_flag=True, help="Overwrite that file."),
         click.option(
             "--contact",
             "contacts",
@@ -102,6 +120,8 @@ def read_stance(
     width: float | None,
     loads: tuple[str, ...] = (),
     payloads: tuple[str, ...] = (),
+    save_stance: str | None = None,
+    force_stance: bool = False,
     **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
@@ -111,6 +131,21 @@ def read_stance(
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
+    file = remembered_stance()
+    if file is not None:
+        placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
+        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
+            raise InvalidInputError(
+                f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
+                "option. Give one of them."
+            )
+        stance = file.stance()
+        echo_notes(stance.robot.notes)
+        return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
+    if not robot:
+        raise InvalidInputError(
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
+        )
     if sole_height is not None:
         if contact_at == "sole":
             raise InvalidInputError(
@@ -140,7 +175,9 @@ def read_stance(
         width=width,
         drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
-    return put_loads(stance, loads, payloads)
+    return written(
+        put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
+    )
 
 
 def _read_contacts(

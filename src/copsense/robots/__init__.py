@@ -4,6 +4,7 @@ from copsense.robots.contact_soles import ContactGeometryWarning, sole_notes
 from copsense.robots.four_bar import four_bar_angles, four_bar_robot
 from copsense.robots.plausibility import ImplausibleStanceWarning, plausibility_notes
 from copsense.robots.presets import PRESETS, Preset
+from copsense.robots.stance_file import StanceFile, save_stance
 from copsense.robots.standing import (
     StandingWarning,
     likely_feet,
@@ -18,6 +19,7 @@ __all__ = [
     "ContactGeometryWarning",
     "ImplausibleStanceWarning",
     "Preset",
+    "StanceFile",
     "StandingWarning",
     "UprightWarning",
     "four_bar_angles",
@@ -26,6 +28,7 @@ __all__ = [
     "load_robot",
     "load_stance",
     "plausibility_notes",
+    "save_stance",
     "sole_notes",
     "stand",
 ]

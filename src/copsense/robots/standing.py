@@ -111,7 +111,8 @@ def load_stance(
     Joints not named start at zero, or inside their range where that leaves zero out.
 
     Args:
-        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``.
+        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``; or a stance file (.toml),
+            which says all the rest itself.
         contacts: frames (taken as surface contacts) or `Contact` values; default the preset's.
         posture: joint name -> position [rad, or m] that the stance stays nearest to; it replaces
             the preset's joint by joint.
@@ -131,6 +132,16 @@ def load_stance(
     """
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
+    if isinstance(source, str | Path) and str(source).endswith(".toml"):
+        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
+        if any(value is not None for value in given):
+            raise InvalidInputError(
+                f"the stance file {source} says how the robot stands, and so does another "
+                "argument. Change the file, or leave the argument out."
+            )
+        from copsense.robots.stance_file import StanceFile
+
+        return StanceFile.read(source).stance()
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
     robot = load_robot(
         source,

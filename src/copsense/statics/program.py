@@ -22,6 +22,7 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
+from copsense.content import ShortRepr
 from copsense.errors import CopsenseError, UnsolvedError
 from copsense.statics import qp
 
@@ -48,8 +49,8 @@ class NoPointError(CopsenseError):
         super().__init__(f"infeasible by {violation:.3g}")
 
 
-@dataclass(frozen=True, eq=False)
-class Optimum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimum(ShortRepr):
     """The optimum of a program.
 
     Attributes:
@@ -65,8 +66,8 @@ class Optimum:
     error: float
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(ShortRepr):
     """A strictly convex quadratic program (on the null space of E').
 
     Attributes:
@@ -89,6 +90,10 @@ class Program:
     b: Float[np.ndarray, " r"]
     unit: float
     tolerance: float = 1e-8
+
+    def __getstate__(self) -> dict[str, object]:
+        """What is pickled: systems are factorised again where they are needed."""
+        return {k: v for k, v in self.__dict__.items() if k != "_systems"}
 
     @cached_property
     def scale(self) -> Float[np.ndarray, " r"]:

@@ -50,6 +50,11 @@ class BatchKernel:
     gains: bool
     fallback_reason: str
 
+    def __repr__(self) -> str:
+        """Robot and criteria, and whether the kernel serves them."""
+        how = f"; one at a time: {self.fallback_reason}" if self.fallback_reason else ""
+        return f"BatchKernel({self.stance.robot.name!r}; criteria {', '.join(self.names)}{how})"
+
     def __init__(
         self, stance: Stance, criteria: Sequence[Criterion | WrenchPolicy], *, gains: bool = True
     ) -> None:
