@@ -61,6 +61,8 @@ def read_urdf_drives(text: str, model: pin.Model) -> UrdfDrives:
 
 @dataclass(eq=False)
 class _Reader:
+    """Reads a URDF beside the model that was built from it, and notes what it assumes."""
+
     root: ET.Element
     model: pin.Model
     notes: list[str] = field(default_factory=list)
