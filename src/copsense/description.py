@@ -93,6 +93,7 @@ def load_description(
     if path is not None and not is_file(path):
         what = f"{path} is a folder" if is_folder(path) else f"no file at {str(source)[:300]!r}"
         raise ModelLoadError(f"{what}. Give the path of a {kind} file, or its text.")
+    check_package_dirs(package_dirs)
     name = str(path or "the text given")
     text, document = _parse(source if path is None else path, name, kind)
     spaced = without_namespace(document)
@@ -119,6 +120,20 @@ def load_description(
     if spaced or notes:
         text = ET.tostring(document, encoding="unicode")
     return Description(text, found, tuple(map(str, package_dirs)), path, notes, tuple(frames), root)
+
+
+def check_package_dirs(folders: Iterable[str | Path]) -> None:
+    """Reject a folder for meshes that is not there.
+
+    Raises:
+        ModelLoadError: there is no such folder.
+    """
+    for folder in folders:
+        if not is_folder(Path(folder)):
+            raise ModelLoadError(
+                f"there is no folder {str(folder)!r} to look meshes up in. Give folders that are "
+                "there as package_dirs (--package-dir)."
+            )
 
 
 def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:

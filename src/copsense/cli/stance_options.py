@@ -128,6 +128,7 @@ def read_stance(
 
     The robot's notes are printed.
     """
+    from copsense.description import check_package_dirs
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
@@ -146,6 +147,7 @@ def read_stance(
         raise InvalidInputError(
             "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
         )
+    check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
         if contact_at == "sole":
             raise InvalidInputError(
