@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
@@ -106,6 +107,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        drive_options,
         load_options,
         limits_option,
     ]
@@ -128,6 +130,7 @@ def read_stance(
     payloads: tuple[str, ...] = (),
     save_stance: str | None = None,
     force_stance: bool = False,
+    **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -140,7 +143,7 @@ def read_stance(
     file = remembered_stance()
     if file is not None:
         placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
-        if robot or any(value not in (None, ()) for value in placed):
+        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
                 "option. Give one of them."
@@ -182,6 +185,7 @@ def read_stance(
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
+        drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
     echo_notes(soles_read(stance))
     return written(

@@ -13,8 +13,10 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
+from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
+from copsense.drives import Drives
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.posture import pull_back, solve_posture
@@ -41,6 +43,8 @@ def load_robot(
     package_dirs: Iterable[str | Path] = (),
     frames: Iterable[str] = (),
     root: str | None = None,
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
@@ -50,13 +54,28 @@ def load_robot(
         frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
             tree that holds them is the robot.
         root: name of a body of the robot that is meant, where an MJCF holds several.
+        drives: what holds its joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
-        UnknownNameError: neither a preset nor a file, or no body is named `root`.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`, or drives are
+            of a joint or frame that the robot has not.
         ModelLoadError: the file cannot be read.
         InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
+    robot = _read(source, package_dirs, frames, root)
+    if drives is not None:
+        robot = robot.with_drives(drives)
+    return robot.without_motors(passive) if passive else robot
+
+
+def _read(
+    source: str | Path | Robot | pin.Model,
+    package_dirs: Iterable[str | Path],
+    frames: Iterable[str],
+    root: str | None,
+) -> Robot:
     if isinstance(source, Robot):
         return source
     if isinstance(source, pin.Model):
@@ -84,6 +103,8 @@ def load_stance(
     contact_at: ContactAt | None = None,
     soles: Geometry = "collision",
     package_dirs: Iterable[str | Path] = (),
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Stance:
     """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
 
@@ -107,6 +128,8 @@ def load_stance(
         soles: which geometry soles are read from: what collides, or what is drawn, for a URDF
             without collision geometry.
         package_dirs: folders that hold the packages of ``package://`` meshes.
+        drives: what holds the robot's joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
@@ -116,7 +139,7 @@ def load_stance(
     if soles not in get_args(Geometry):
         raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
-        given = (contacts, posture, base_rpy, width, contact_at)
+        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
         if any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
@@ -126,7 +149,13 @@ def load_stance(
 
         return StanceFile.read(source).stance()
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
+    robot = load_robot(
+        source,
+        package_dirs=package_dirs,
+        frames=_frames(contacts),
+        drives=drives,
+        passive=passive,
+    )
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -143,6 +172,7 @@ def load_stance(
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
     q = robot.configuration({**rest_positions(robot), **own, **(posture or {})})
+    q = close(robot, q, held=posture if posture else own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
