@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from copsense.xml_numbers import wrong_number
 
 Language = Literal["urdf", "mjcf"]
 
+_DRAKE = 'xmlns:drake="http://drake.mit.edu"'
 _ROOTS: dict[Language, str] = {"urdf": "robot", "mjcf": "mujoco"}
 # Attributes of an MJCF's bodies, inertials and joints that hold numbers; the parser reads a word as
 # whatever comes next in memory or as zero.
@@ -157,6 +159,11 @@ def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
     except (LookupError, ValueError, ET.ParseError) as error:
         if "unbound prefix" in str(error) and "<xacro:" in text:
             raise _unexpanded(name, ("<xacro:...>",)) from None
+        if "unbound prefix" in str(error) and _DRAKE not in text and "<drake:" in text:
+            # Drake's elements, of a prefix that its own parser does not ask to be declared.
+            declared = re.sub(r"<robot(?=\s)", f"<robot {_DRAKE}", text, count=1)
+            if declared != text:
+                return _parse(declared, name, kind)
         raise ModelLoadError(
             f"{name} is not XML in UTF-8 or the encoding that it declares: {error}. Give a {kind} "
             "file that is whole."

@@ -19,6 +19,7 @@ from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
+from copsense.urdf_drives import read_urdf_drives
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
@@ -209,6 +210,15 @@ class Robot:
         """
         return replace(self, drives=drives)
 
+    def without_motors(self, joints: Iterable[str]) -> Robot:
+        """The same robot where these joints have no motor.
+
+        Raises:
+            UnknownNameError: a joint is not in the model.
+            InvalidInputError: a transmission drives one.
+        """
+        return self.with_drives(self.drives.without_motors(joints, self.dof_names))
+
     def with_payload(
         self,
         frame: str,
@@ -250,11 +260,13 @@ class Robot:
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
         if description.language == "urdf":
-            model = _build_urdf(description)
-            return cls(name or model.name or "robot", model, description, description.notes)
+            found = read_urdf_drives(description.text, _build_urdf(description))
+            notes, model = (*description.notes, *found.notes), found.model
+            return cls(name or model.name or "robot", model, description, notes, found.drives)
         read = read_mjcf(description)
         notes = (*description.notes, *read.notes)
-        return cls(name or read.model.name or "robot", read.model, description, notes, mjcf=read)
+        title = name or read.model.name or "robot"
+        return cls(title, read.model, description, notes, read.drives, mjcf=read)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.

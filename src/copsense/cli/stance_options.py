@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
@@ -57,6 +58,13 @@ def stance_options(command: F) -> F:
             "collision geometry shows it.",
         ),
         click.option(
+            "--soles",
+            type=click.Choice(["collision", "visual"]),
+            default="collision",
+            help="Geometry that soles are read from: what collides (default), or what is drawn, "
+            "for a URDF without collision geometry.",
+        ),
+        click.option(
             "--sole",
             metavar="X0:X1:Y0:Y1",
             help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
@@ -99,6 +107,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        drive_options,
         load_options,
         limits_option,
     ]
@@ -109,6 +118,7 @@ def read_stance(
     robot: str,
     contacts: tuple[str, ...],
     contact_at: Any,
+    soles: Any,
     sole: str | None,
     sole_height: float | None,
     package_dirs: tuple[str, ...],
@@ -120,6 +130,7 @@ def read_stance(
     payloads: tuple[str, ...] = (),
     save_stance: str | None = None,
     force_stance: bool = False,
+    **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -127,12 +138,12 @@ def read_stance(
     """
     from copsense.description import check_package_dirs
     from copsense.robot import Robot
-    from copsense.robots import PRESETS, load_robot, load_stance
+    from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
     file = remembered_stance()
     if file is not None:
         placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
-        if robot or any(value not in (None, ()) for value in placed):
+        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
                 "option. Give one of them."
@@ -142,7 +153,8 @@ def read_stance(
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
     if not robot:
         raise InvalidInputError(
-            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE; "
+            "see --help."
         )
     check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
@@ -168,11 +180,14 @@ def read_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
+        soles=soles,
         package_dirs=package_dirs,
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
+        drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
+    echo_notes(soles_read(stance))
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
     )

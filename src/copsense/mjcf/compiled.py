@@ -13,11 +13,12 @@ from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.mjcf.audit import check_against
 from copsense.mjcf.collision import collision_shapes
+from copsense.mjcf.driving import read_drives
 from copsense.mjcf.effort import effort_limits
 from copsense.mjcf.gravity import usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
 from copsense.mjcf.scene import find_robot, left_out
-from copsense.mjcf.tree_model import build_tree
+from copsense.mjcf.tree_model import build_tree, pose
 from copsense.mjcf.unused import unused
 
 _UNNAMED = "MuJoCo Model"  # what MuJoCo calls a model without a name
@@ -39,8 +40,10 @@ def read_compiled(description: Description) -> MjcfReading:
     tree.model.upperEffortLimit = effort_limits(mj, tree)
     tree.model.lowerEffortLimit = -tree.model.upperEffortLimit
     check_against(mj, tree)
-    notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree))
-    return MjcfReading(tree.model, collision_shapes(mj, tree), notes)
+    drives, assumed = read_drives(mj, tree)
+    notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree), *assumed)
+    base = np.array(pose(np.zeros(3), mj.body_quat[root]).rotation)
+    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives, base)
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -13,8 +13,10 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
+from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
+from copsense.drives import Drives
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.posture import pull_back, solve_posture
@@ -23,6 +25,7 @@ from copsense.robots.contact_soles import ContactAt, complete_contacts
 from copsense.robots.plausibility import check_plausible, check_size
 from copsense.robots.presets import PRESETS, preset_robot
 from copsense.robots.uprighting import base_turn, upright_contacts
+from copsense.shapes import Geometry
 from copsense.stance import Stance, check_support
 
 _UP = 0.1  # z of a plane's normal up to which it is a wall
@@ -40,6 +43,8 @@ def load_robot(
     package_dirs: Iterable[str | Path] = (),
     frames: Iterable[str] = (),
     root: str | None = None,
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
@@ -49,13 +54,28 @@ def load_robot(
         frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
             tree that holds them is the robot.
         root: name of a body of the robot that is meant, where an MJCF holds several.
+        drives: what holds its joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
-        UnknownNameError: neither a preset nor a file, or no body is named `root`.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`, or drives are
+            of a joint or frame that the robot has not.
         ModelLoadError: the file cannot be read.
         InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
+    robot = _read(source, package_dirs, frames, root)
+    if drives is not None:
+        robot = robot.with_drives(drives)
+    return robot.without_motors(passive) if passive else robot
+
+
+def _read(
+    source: str | Path | Robot | pin.Model,
+    package_dirs: Iterable[str | Path],
+    frames: Iterable[str],
+    root: str | None,
+) -> Robot:
     if isinstance(source, Robot):
         return source
     if isinstance(source, pin.Model):
@@ -81,7 +101,10 @@ def load_stance(
     base_rpy: Sequence[float] | Float[np.ndarray, " 3"] | None = None,
     width: float | None = None,
     contact_at: ContactAt | None = None,
+    soles: Geometry = "collision",
     package_dirs: Iterable[str | Path] = (),
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Stance:
     """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
 
@@ -102,15 +125,21 @@ def load_stance(
             and reads its polygon; ``"frame"`` keeps it at the model's frame and reads the polygon
             if it can. Default: as the preset says; for another robot ``"frame"``, with a warning
             where that is not on the sole.
+        soles: which geometry soles are read from: what collides, or what is drawn, for a URDF
+            without collision geometry.
         package_dirs: folders that hold the packages of ``package://`` meshes.
+        drives: what holds the robot's joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
     """
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
+    if soles not in get_args(Geometry):
+        raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
-        given = (contacts, posture, base_rpy, width, contact_at)
+        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
         if any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
@@ -120,7 +149,13 @@ def load_stance(
 
         return StanceFile.read(source).stance()
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
+    robot = load_robot(
+        source,
+        package_dirs=package_dirs,
+        frames=_frames(contacts),
+        drives=drives,
+        passive=passive,
+    )
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -136,7 +171,8 @@ def load_stance(
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
-    q = robot.configuration({**_inside(robot), **own, **(posture or {})})
+    q = robot.configuration({**rest_positions(robot), **own, **(posture or {})})
+    q = close(robot, q, held=posture if posture else own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
@@ -149,7 +185,7 @@ def load_stance(
         rpy = np.array(preset.base_rpy if preset else base_turn(robot, chosen, q))
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
     check_size(Stance(robot, q, chosen, check=False))
-    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at)
+    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at, soles)
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
     return stand(robot, chosen, q, width=width)
@@ -253,7 +289,7 @@ def _settled(
     return found
 
 
-def _inside(robot: Robot) -> dict[str, float]:
+def rest_positions(robot: Robot) -> dict[str, float]:
     """Joint -> a position inside its range, for joints whose range leaves zero out [rad, m]."""
     lower, upper = robot.position_limits
     inside = {}
