@@ -28,7 +28,7 @@ def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
     if equilibrium.unloaded:
         raise UnloadedContactError(equilibrium.unloaded)
     w = equilibrium.wrenches
-    return np.array([-w[:, 4] / w[:, 2], w[:, 3] / w[:, 2]]).T
+    return w[:, 4:2:-1] * (-1.0, 1.0) / w[:, 2:3]
 
 
 def edge_margin(polygon: ArrayLike, point: ArrayLike) -> EdgeMargin:

@@ -51,8 +51,8 @@ class LoadProblem(ShortRepr):
         if robot.actuation is not None:
             map_, N = robot.by_drive(map_), robot.by_drive(N)
             inertia = robot.actuation.inverse @ inertia @ robot.actuation.inverse.T
-        parts = (map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
-        return cls(*map(read_only, parts))
+            map_, N, inertia = read_only(map_), read_only(N), read_only(inertia)
+        return cls(map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
 
     def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
         """The torques that contact forces take (n,) [Nm]."""

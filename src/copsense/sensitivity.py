@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -245,19 +246,20 @@ class CopSensitivity:
     def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
         stance = self.equilibrium.stance
         # s = w (b - a p) is linear in the wrench: one row gives the slack and its rate.
-        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1))
-        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
-        speed = np.hypot(rate[:, 0], rate[:, 1])
-        # An edge that stands still and is passed already leaves no way back.
-        distance = np.where(slack < -_ON_EDGE, -np.inf, np.inf)
-        np.divide(slack, speed, out=distance, where=speed > _STILL)
-        travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
+        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1)).tolist()
+        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2)).tolist()
+        travel, edge = [np.inf] * len(self.cop), [-1] * len(self.cop)
+        # Plain numbers: a sole's few edges would take NumPy longer.
         for k, rows in enumerate(stance.edges):
-            if rows.start < rows.stop:
-                i = int(distance[rows].argmin())
-                if distance[rows][i] < np.inf:
-                    travel[k], edge[k] = distance[rows][i], i
-        return read_only(travel), read_only(edge)
+            for i in range(rows.start, rows.stop):
+                speed = math.hypot(*rate[i])
+                if speed > _STILL:
+                    distance = slack[i] / speed
+                else:  # an edge that stands still and is passed already leaves no way back
+                    distance = -np.inf if slack[i] < -_ON_EDGE else np.inf
+                if distance < travel[k]:
+                    travel[k], edge[k] = distance, i - rows.start
+        return read_only(np.array(travel)), read_only(np.array(edge))
 
 
 def cop_sensitivity(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
@@ -103,12 +104,14 @@ class StaticEquilibrium:
     @property
     def unloaded(self) -> tuple[str, ...]:
         """Names of the contacts without normal force."""
-        return self._named(np.abs(self.wrenches[:, 2]) <= UNLOADED * self.stance.robot.weight)
+        least = UNLOADED * self.stance.robot.weight
+        return tuple(name for name, load in self._loads if abs(load) <= least)
 
     @property
     def pulling(self) -> tuple[str, ...]:
         """Names of the contacts that would have to pull: the ground cannot."""
-        return self._named(self.wrenches[:, 2] < -UNLOADED * self.stance.robot.weight)
+        least = UNLOADED * self.stance.robot.weight
+        return tuple(name for name, load in self._loads if load < -least)
 
     def residual(self) -> float:
         """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
@@ -148,9 +151,10 @@ class StaticEquilibrium:
         system = self._system or Kkt(self.stance, self.criterion)
         return system.derivative(self, directions)
 
-    def _named(self, those: Bool[np.ndarray, " nc"]) -> tuple[str, ...]:
-        names = self.stance.contact_names
-        return tuple(names[k] for k in np.flatnonzero(those)) if those.any() else ()
+    @property
+    def _loads(self) -> Iterable[tuple[str, float]]:
+        """Name and normal force of each contact."""
+        return zip(self.stance.contact_names, self.wrenches[:, 2].tolist(), strict=True)
 
 
 def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticEquilibrium:

@@ -17,7 +17,8 @@ _NULL = 1e-10  # singular values, relative, that count as lost
 class SymmetricSystem:
     """K y = right, for any number of columns, with one step of refinement.
 
-    Rows and columns are scaled alike first, so that weights of any unit may stand in K.
+    Rows and columns of far different sizes are scaled alike first, so that weights of any unit may
+    stand in K.
 
     Attributes:
         matrix: K (k, k).
@@ -28,13 +29,17 @@ class SymmetricSystem:
     def __init__(self, matrix: Float[np.ndarray, "k k"]) -> None:
         """Scale and factorise."""
         self.matrix = matrix
-        entries, scale = np.abs(matrix), np.ones(len(matrix))
+        self._scale: np.ndarray | None = None
+        self._scaled, entries = matrix, np.abs(matrix)
         for _ in range(3):
-            size = scale * (entries * scale).max(axis=1)
+            size = entries.max(axis=1)
             if size.min() > _ALIKE * size.max():
                 break
-            scale /= np.sqrt(np.where(size > 0, size, 1.0))
-        self._scale, self._scaled = scale, scale[:, None] * matrix * scale
+            step = 1.0 / np.sqrt(np.where(size > 0, size, 1.0))
+            self._scale = step if self._scale is None else self._scale * step
+            entries = step[:, None] * entries * step
+        if self._scale is not None:
+            self._scaled = self._scale[:, None] * matrix * self._scale
         self._lu, self._pivots, self._info = lapack.dgetrf(self._scaled)
         self._inverse: np.ndarray | None = None
 
@@ -57,8 +62,12 @@ class SymmetricSystem:
         return y + self._once(right - self.matrix.dot(y))
 
     def _once(self, right: np.ndarray) -> np.ndarray:
+        if self._scale is None:
+            return self._unscaled(right)
         scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        scaled = scale * right
+        return np.asarray(scale * self._unscaled(scale * right))
+
+    def _unscaled(self, right: np.ndarray) -> np.ndarray:
         if self._inverse is not None:
-            return np.asarray(scale * (self._inverse @ scaled))
-        return np.asarray(scale * lapack.dgetrs(self._lu, self._pivots, scaled)[0])
+            return np.asarray(self._inverse @ right)
+        return np.asarray(lapack.dgetrs(self._lu, self._pivots, right)[0])
