@@ -28,15 +28,16 @@ import pinocchio as pin
 from jaxtyping import Float
 from scipy.linalg import lapack
 
+from copsense.arrays import check_type
 from copsense.controllers.controller import Command, Observation
 from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
-from copsense.criterion import Criterion
-from copsense.limits import Limits
+from copsense.criterion import Criterion, check_criterion
+from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _RANK = 1e-10  # relative pivot under which the contacts are taken as redundant
 
@@ -69,6 +70,10 @@ class BalancingController:
         name: str | None = None,
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
+        check_stance(stance)
+        check_criterion(criterion)
+        limits = optional_limits(limits)
+        check_type(gains, Gains, "a set of gains", "Give STIFF, public_gains(robot) or Gains(...).")
         self.stance = stance
         self.criterion = criterion
         self.gains = gains

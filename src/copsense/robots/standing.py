@@ -12,7 +12,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import checked_positions, finite_array, finite_number
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
@@ -136,7 +136,9 @@ def load_stance(
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
-    q = robot.configuration({**_inside(robot), **own, **(posture or {})})
+    q = robot.configuration(
+        {**_inside(robot), **own, **checked_positions(posture, "the posture's joints")}
+    )
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
