@@ -25,6 +25,7 @@ INTERNAL = (
     "copsense.paper",
     "copsense.plots.reading",
     "copsense.quadratic",
+    "copsense.robots.stance_file",  # a file that is being read
     "copsense.statics.program",
 )
 IN_THE_LOOP = {"Command", "Observation", "Snapshot", "Target"}  # good until the next step
@@ -47,7 +48,7 @@ def test_no_part_of_a_result_can_be_written_to(everything):
     for part in everything:
         value, again = part.value, part.again
         if isinstance(value, np.ndarray):
-            # One that is made anew at each question is the caller's own.
+            # One that is made again at each question is the caller's own.
             shared = value is again or np.shares_memory(value, again)
             own = value.flags.writeable and value.size and not part.where.startswith(FILLED)
             if shared and own:

@@ -11,7 +11,7 @@ and a `Loop` is a pair of frames that a rod, a pin or a weld keeps together.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -235,6 +235,42 @@ class Drives(ShortRepr):
             tuple(each for each in self.transmissions if kept.issuperset(each.joints)),
         )
 
+    def without_motors(self, passive: Iterable[str], joints: Iterable[str]) -> Drives:
+        """The same drives without motors on some joints; followers have none anyway.
+
+        Args:
+            passive: names of joints; of one with several degrees of freedom, all of them.
+            joints: label of each degree of freedom behind the base (n,).
+
+        Raises:
+            UnknownNameError: a joint is not one of them.
+            InvalidInputError: a transmission drives it.
+        """
+        names = tuple(joints)
+        idle = set(_labels(passive, names, "joint without a motor"))
+        for each in self.transmissions:
+            if shared := idle.intersection(each.joints):
+                raise InvalidInputError(
+                    f"joint {min(shared)!r} is driven by {', '.join(each.motors)}. Give drives "
+                    "without that transmission (drives=Drives(...))."
+                )
+        return replace(self, motors=tuple(j for j in self._own(names) if j not in idle))
+
+    def with_motors(self, driven: Iterable[str], joints: Iterable[str]) -> Drives:
+        """The same drives with motors on some joints too; arguments and errors alike."""
+        names = tuple(joints)
+        more = _labels(driven, names, "joint with a motor")
+        have = {*self._own(names), *more}
+        return replace(self, motors=tuple(joint for joint in names if joint in have))
+
+    def _own(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The joints with a motor of their own."""
+        if self.motors is not None:
+            return self.motors
+        elsewhere = {coupling.joint for coupling in self.couplings}
+        elsewhere |= {joint for each in self.transmissions for joint in each.joints}
+        return tuple(joint for joint in names if joint not in elsewhere)
+
     def on(self, joints: Iterable[str]) -> Actuation | None:
         """Which torques these motors exert on a robot's joints; None if each joint has its own.
 
@@ -257,11 +293,8 @@ class Drives(ShortRepr):
                     raise UnknownNameError(f"joint of a {what}", joint, names)
         if self.motors is None and not self.couplings and not self.transmissions:
             return None
-        elsewhere = {coupling.joint for coupling in self.couplings}
-        elsewhere |= {joint for each in self.transmissions for joint in each.joints}
-        own = [j for j in names if j not in elsewhere] if self.motors is None else self.motors
         columns: list[tuple[int, str, np.ndarray]] = []
-        for joint in own:
+        for joint in self._own(names):
             at = names.index(joint)
             columns.append((at, joint, np.eye(len(names))[at]))
         for each in self.transmissions:
@@ -304,6 +337,19 @@ class Actuation(ShortRepr):
             free = np.linalg.svd(S)[0][:, k:].T.copy()
         object.__setattr__(self, "inverse", read_only(inverse))
         object.__setattr__(self, "free", read_only(free))
+
+
+def _labels(given: Iterable[str], names: tuple[str, ...], what: str) -> list[str]:
+    """Joints as the labels of their degrees of freedom."""
+    if isinstance(given, str):
+        raise InvalidInputError(f"{given!r} is one name. Give a list of joints, [{given!r}].")
+    found = []
+    for joint in given:
+        labels = [name for name in names if name == joint or name.startswith(f"{joint}[")]
+        if not labels:
+            raise UnknownNameError(what, joint, names)
+        found += labels
+    return found
 
 
 def _reject_twice(names: Iterable[str], how: str) -> None:

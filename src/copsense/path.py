@@ -286,7 +286,7 @@ def path_through(
     Args:
         stance: says where the contacts are.
         configurations: the configurations (nq,), in order.
-        project: move each onto the manifold instead of refusing one that has moved a contact.
+        project: move each onto the manifold instead of rejecting one that has moved a contact.
         strict: raise at a configuration that cannot be used; False lists it in
             `PosturePath.failures`.
 

@@ -332,6 +332,11 @@ def _independent(
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve, or take the minimum-norm least squares where constraints are redundant."""
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        raise UnreachablePostureError(
+            "the search for a posture left all bounds: numbers of the model are too large or too "
+            "small for it. Check its lengths [m], masses [kg] and angles [rad]."
+        )
     try:
         solution = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:

@@ -156,7 +156,7 @@ class CopSensitivity:
         return equilibrium.next_active_set_change(t / speed)
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
-        """d cop / d joint [m/rad] along a path with this tangent."""
+        """d cop / d joint along a path with this tangent [m/rad, or m/m of a prismatic joint]."""
         index = self.equilibrium.stance.robot.velocity_index(joint)
         t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
         return self.along(t, float(t[index]))

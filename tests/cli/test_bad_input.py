@@ -63,8 +63,20 @@ from copsense.files import load_configurations
         ("benchmark icub --disturbance velocity_noise:severe=1m", "Give a rate, such as 1 (degree"),
         ("four-bar --leg-length nan", "leg_length is nan. Give a positive"),
         ("four-bar --criterion least-effort", "minimum-tangential"),
-        ("four-bar --criterion minimum-wrench --characteristic-length 0", "characteristic_length"),
-        ("four-bar --criterion weighted-torque --hip-weight 0", "hip_weight"),
+        (
+            "four-bar --criterion minimum-wrench --characteristic-length 0",
+            "characteristic-length is 0",
+        ),
+        ("four-bar --criterion weighted-torque --hip-weight 0", "hip-weight is 0"),
+        ("four-bar --characteristic-length 0", "--characteristic-length is 0"),
+        ("four-bar --hip-weight -1", "--hip-weight is -1"),
+        ("four-bar --ankle-weight nan", "--ankle-weight is nan"),
+        ("balance icub --gain com-stiffness=-3", "the gain com-stiffness is -3"),
+        ("balance icub --gain com-damping=nan", "the gain com-damping is nan"),
+        ("analyse icub --package-dir absent", "no folder 'absent' to look"),
+        ("design icub --com-y 0:1:1", "a path of 5 postures or more, this one has 1"),
+        ("reproduce --output absent/report", "Create it first"),
+        ("reproduce --output /proc/report", "cannot be written"),
         ("sweep icub", "say what to sweep"),
         ("sweep icub --com-y 0:1:3 --joint l_knee=0:1:2", "say what to sweep"),
         ("sweep icub --com-y 1:2", "Give START:STOP:COUNT"),
@@ -188,7 +200,7 @@ def test_an_output_that_exists_is_kept_without_force(suffix, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-def test_an_output_under_a_file_or_in_no_folder_is_refused_before_the_sweep(tmp_path, monkeypatch):
+def test_an_output_under_a_file_or_in_no_folder_is_rejected_before_the_sweep(tmp_path, monkeypatch):
     def never(*args, **kwargs):
         raise AssertionError("the sweep began")
 
@@ -241,3 +253,9 @@ def test_the_height_of_a_sole_is_along_the_contact_s_normal():
         for h in ("-0.08", "-0.07")
     )
     assert low - high == pytest.approx(0.01, abs=1e-9)
+
+
+def test_the_reason_of_a_bad_table_ends_in_one_full_stop(tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text("1,2\n3,x\n")
+    assert ".." not in copsense("sweep", "icub", "--configurations", path).error

@@ -12,8 +12,8 @@ import pytest
 
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
-    "robots", "analyse", "sweep", "plot", "map", "design", "balance", "benchmark", "four-bar",
-    "reproduce",
+    "robots", "analyse", "sweep", "plot", "map", "push", "design", "balance", "benchmark",
+    "four-bar", "reproduce",
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",

@@ -51,7 +51,7 @@ def independent(raw):
 
 
 def least_violation(raw):
-    """By how much the inequality rows, each of length one, have to give way at least."""
+    """By how much the inequality rows, each of length one, have to be relaxed at least."""
     size = len(raw.c)
     cost = np.append(np.zeros(size), 1.0)
     C = np.hstack([raw.C, -np.ones((len(raw.d), 1))])

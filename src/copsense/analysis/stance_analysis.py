@@ -14,7 +14,7 @@ from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
 from copsense.content import freeze
-from copsense.cop import total_center_of_pressure
+from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import UndeterminedWrenchError
 from copsense.freedom import freedom_notes
@@ -133,10 +133,20 @@ class Analysis:
                 {"name": c.name, "frame": c.frame, "kind": c.kind, "position": p.translation}
                 for c, p in zip(stance.contacts, stance.placements, strict=True)
             ],
+            "support_margin": self._support_margin,
             "criteria": {name: self._criterion(name) for name in self.sensitivities},
         }
         data["verdict"] = verdict(data)
         return data | {"notes": list(self.notes), "checked": self.checked}
+
+    @property
+    def _support_margin(self) -> float | None:
+        """How far the whole robot's centre of pressure is inside the support polygon [m]."""
+        outline = support_polygon(self.stance)
+        if outline is None or len(outline) < 2:
+            return None
+        at = total_center_of_pressure(next(iter(self.equilibria.values())))[:2]
+        return float(outline.margins(at)) if len(outline) > 2 else -outline.boundary_distance(at)
 
     def _criterion(self, name: str) -> dict[str, Any]:
         found = self.sensitivities[name]
@@ -159,6 +169,7 @@ class Analysis:
         for k, contact in enumerate(self.stance.contacts):
             edge = int(found.tipping_edge[k])
             row: dict[str, Any] = {
+                "kind": contact.kind,
                 "wrench": equilibrium.wrenches[k],
                 "load_share": float(equilibrium.wrenches[k, 2]) / self.stance.robot.weight,
                 "pulling": contact.name in equilibrium.pulling,
@@ -166,6 +177,7 @@ class Analysis:
                 "cop_slope": slope[k],
                 "cop_gain": found.com_gain[k],
                 "worst_case_gain": float(found.worst_case_gain[k]),
+                "load_gain": found.load_gain[k],
                 "com_travel": float(found.com_travel[k]),
                 "tipping_edge": None if edge < 0 else edge,
                 "unloading_travel": float(found.unloading_travel[k]),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
@@ -99,6 +100,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        drive_options,
         load_options,
         limits_option,
     ]
@@ -120,18 +122,20 @@ def read_stance(
     payloads: tuple[str, ...] = (),
     save_stance: str | None = None,
     force_stance: bool = False,
+    **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
     The robot's notes are printed.
     """
+    from copsense.description import check_package_dirs
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance
 
     file = remembered_stance()
     if file is not None:
         placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
-        if robot or any(value not in (None, ()) for value in placed):
+        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
                 "option. Give one of them."
@@ -143,6 +147,7 @@ def read_stance(
         raise InvalidInputError(
             "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
         )
+    check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
         if contact_at == "sole":
             raise InvalidInputError(
@@ -170,6 +175,7 @@ def read_stance(
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
+        drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs

@@ -13,6 +13,7 @@ from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.mjcf.audit import check_against
 from copsense.mjcf.collision import collision_shapes
+from copsense.mjcf.driving import read_drives
 from copsense.mjcf.effort import effort_limits
 from copsense.mjcf.gravity import usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
@@ -39,8 +40,9 @@ def read_compiled(description: Description) -> MjcfReading:
     tree.model.upperEffortLimit = effort_limits(mj, tree)
     tree.model.lowerEffortLimit = -tree.model.upperEffortLimit
     check_against(mj, tree)
-    notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree))
-    return MjcfReading(tree.model, collision_shapes(mj, tree), notes)
+    drives, assumed = read_drives(mj, tree)
+    notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree), *assumed)
+    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives)
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -13,8 +13,10 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import checked_positions, finite_array, finite_number
+from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
+from copsense.drives import Drives
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.posture import pull_back, solve_posture
@@ -40,6 +42,8 @@ def load_robot(
     package_dirs: Iterable[str | Path] = (),
     frames: Iterable[str] = (),
     root: str | None = None,
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
@@ -49,13 +53,28 @@ def load_robot(
         frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
             tree that holds them is the robot.
         root: name of a body of the robot that is meant, where an MJCF holds several.
+        drives: what holds its joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
-        UnknownNameError: neither a preset nor a file, or no body is named `root`.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`, or drives are
+            of a joint or frame that the robot has not.
         ModelLoadError: the file cannot be read.
         InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
+    robot = _read(source, package_dirs, frames, root)
+    if drives is not None:
+        robot = robot.with_drives(drives)
+    return robot.without_motors(passive) if passive else robot
+
+
+def _read(
+    source: str | Path | Robot | pin.Model,
+    package_dirs: Iterable[str | Path],
+    frames: Iterable[str],
+    root: str | None,
+) -> Robot:
     if isinstance(source, Robot):
         return source
     if isinstance(source, pin.Model):
@@ -82,6 +101,8 @@ def load_stance(
     width: float | None = None,
     contact_at: ContactAt | None = None,
     package_dirs: Iterable[str | Path] = (),
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Stance:
     """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
 
@@ -103,6 +124,8 @@ def load_stance(
             if it can. Default: as the preset says; for another robot ``"frame"``, with a warning
             where that is not on the sole.
         package_dirs: folders that hold the packages of ``package://`` meshes.
+        drives: what holds the robot's joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
@@ -110,7 +133,7 @@ def load_stance(
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
-        given = (contacts, posture, base_rpy, width, contact_at)
+        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
         if any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
@@ -120,7 +143,13 @@ def load_stance(
 
         return StanceFile.read(source).stance()
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
+    robot = load_robot(
+        source,
+        package_dirs=package_dirs,
+        frames=_frames(contacts),
+        drives=drives,
+        passive=passive,
+    )
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -136,9 +165,9 @@ def load_stance(
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
-    q = robot.configuration(
-        {**_inside(robot), **own, **checked_positions(posture, "the posture's joints")}
-    )
+    wanted = checked_positions(posture, "the posture's joints")
+    q = robot.configuration({**_inside(robot), **own, **wanted})
+    q = close(robot, q, held=wanted or own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "

@@ -10,6 +10,9 @@ A solver finds which rows hold; with these held the optimum solves
 
 whose solution is then held against every optimality condition. If one fails, a second solver of
 another kind names the rows; if that fails too, an error says so.
+
+This is what to call for wrenches that are reported and differentiated. `qp` is beneath it: call
+that where the solver's own precision is enough, in a control loop or for a linear program.
 """
 
 from __future__ import annotations
