@@ -2,13 +2,16 @@
 
 import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 from support.driven_files import (
     at_stance,
+    biped,
     contact_push,
     coupled_and_tendons,
     sprung_rods,
 )
+from support.statics_apart import frame_at
 
 import copsense
 from copsense import minimum_torque, solve_equilibrium
@@ -133,3 +136,33 @@ def test_a_tendons_motors_are_a_transmission():
     assert first.joints == ("l_ankle_pitch", "l_ankle_roll")
     assert np.allclose(first.matrix, [[0.9, 1.1], [0.7, -0.6]])
     assert first.effort_limits == (60.0, 60.0)  # the tendon's force
+
+
+WELDS = {
+    "turned": "<weld body1='trunk' body2='forearm' anchor='.01 .02 .03' "
+    "relpose='.1 0 .2 .9 .1 .3 .2'/>",
+    "as it stands": "<weld body1='l_foot' body2='r_foot' anchor='0 .01 .02'/>",
+    "sites": "<weld site1='l_heel' site2='r_heel'/>",
+    "point": "<connect body1='forearm' body2='l_foot' anchor='.1 0 .2'/>",
+}
+
+
+@pytest.mark.parametrize("element", WELDS.values(), ids=WELDS)
+def test_a_loop_is_open_as_far_as_mujoco_says(element):
+    text = biped(tail=f"<equality>{element}</equality>")
+    robot = copsense.load_robot(text)
+    random = np.random.default_rng(1)
+    q = robot.configuration({joint: float(random.normal()) for joint in robot.joint_names})
+    stance = copsense.Stance(robot, q, [copsense.Contact("l_foot")], check=False)
+    model, data = at_stance(text, stance)
+    _, violated = rows(model, data)
+    loop = robot.drives.loops[0]
+    a, b = (
+        frame_at(robot, q, frame, point)
+        for frame, point in ((loop.frame_a, loop.offset_a), (loop.frame_b, loop.offset_b))
+    )
+    assert np.abs(violated[:3] - (a.translation - b.translation)).max() < 1e-9
+    assert (loop.kind == "weld") == (len(violated) == 6)
+    if loop.kind == "weld":
+        angle = np.linalg.norm(pin.log3(b.rotation.T @ a.rotation))
+        assert np.linalg.norm(violated[3:]) == pytest.approx(np.sin(angle / 2), abs=1e-9)

@@ -58,6 +58,13 @@ def stance_options(command: F) -> F:
             "collision geometry shows it.",
         ),
         click.option(
+            "--soles",
+            type=click.Choice(["collision", "visual"]),
+            default="collision",
+            help="Geometry that soles are read from: what collides (default), or what is drawn, "
+            "for a URDF without collision geometry.",
+        ),
+        click.option(
             "--sole",
             metavar="X0:X1:Y0:Y1",
             help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
@@ -111,6 +118,7 @@ def read_stance(
     robot: str,
     contacts: tuple[str, ...],
     contact_at: Any,
+    soles: Any,
     sole: str | None,
     sole_height: float | None,
     package_dirs: tuple[str, ...],
@@ -130,7 +138,7 @@ def read_stance(
     """
     from copsense.description import check_package_dirs
     from copsense.robot import Robot
-    from copsense.robots import PRESETS, load_robot, load_stance
+    from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
     file = remembered_stance()
     if file is not None:
@@ -145,7 +153,8 @@ def read_stance(
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
     if not robot:
         raise InvalidInputError(
-            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE."
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE; "
+            "see --help."
         )
     check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
@@ -171,12 +180,14 @@ def read_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
+        soles=soles,
         package_dirs=package_dirs,
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
         drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
+    echo_notes(soles_read(stance))
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
     )

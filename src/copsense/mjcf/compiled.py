@@ -18,7 +18,7 @@ from copsense.mjcf.effort import effort_limits
 from copsense.mjcf.gravity import usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
 from copsense.mjcf.scene import find_robot, left_out
-from copsense.mjcf.tree_model import build_tree
+from copsense.mjcf.tree_model import build_tree, pose
 from copsense.mjcf.unused import unused
 
 _UNNAMED = "MuJoCo Model"  # what MuJoCo calls a model without a name
@@ -42,7 +42,8 @@ def read_compiled(description: Description) -> MjcfReading:
     check_against(mj, tree)
     drives, assumed = read_drives(mj, tree)
     notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree), *assumed)
-    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives)
+    base = np.array(pose(np.zeros(3), mj.body_quat[root]).rotation)
+    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives, base)
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -58,7 +58,8 @@ _NOT_BY_DEFAULT = {"joint": {"pos"}, "geom": {"mesh"}, "site": {"pos", "quat"}}
 _NOT_USED = {
     "equality": "equalities ({}) are not used.",
     "tendon": "tendons ({}) are not used.",
-    "actuator": "actuators ({}) are not read without MuJoCo: no effort limit comes from them.",
+    "actuator": "actuators ({}) are not read without MuJoCo: no effort limit comes from them, "
+    "and every joint is taken to have a motor.",
 }
 _DROPPED = ("keyframe", *_NOT_USED)
 

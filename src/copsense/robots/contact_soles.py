@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from copsense.contact import Contact
 from copsense.errors import CopsenseError, ModelLoadError
 from copsense.robot import Robot
 from copsense.robots.presets import Preset
-from copsense.sole import read_sole, tilt_text
+from copsense.shapes import Geometry
+from copsense.sole import Sole, read_sole, tilt_text
 from copsense.stance import Stance
 
 ContactAt = Literal["frame", "sole"]
+_AT_FRAME = 0.05  # mm: a sole nearer to its frame is at it
 _OFF_SOLE = 1e-3  # m: a contact frame farther from the sole's bottom is said to be off it
 
 
@@ -24,9 +26,13 @@ class ContactGeometryWarning(UserWarning):
 
 
 def complete_contacts(
-    robot: Robot, contacts: tuple[Contact, ...], preset: Preset | None, at: ContactAt | None
+    robot: Robot,
+    contacts: tuple[Contact, ...],
+    preset: Preset | None,
+    at: ContactAt | None,
+    geometry: Geometry = "collision",
 ) -> tuple[Contact, ...]:
-    """Fill in offsets and polygons from the collision geometry.
+    """Fill in offsets and polygons from the geometry.
 
     A contact that the caller placed stays there, unless the sole is asked for.
     """
@@ -47,7 +53,7 @@ def complete_contacts(
             continue
         robot.frame(contact.frame)
         try:
-            sole = read_sole(robot, contact)
+            sole = read_sole(robot, contact, geometry=geometry)
         except ModelLoadError as error:
             if lower:
                 raise
@@ -67,6 +73,8 @@ def complete_contacts(
                 ContactGeometryWarning,
                 stacklevel=3,
             )
+        if sole.is_tip and contact.polygon is None:
+            warnings.warn(tip_text(contact, sole), ContactGeometryWarning, stacklevel=3)
         offset, up = np.array(contact.offset), contact.rotation[:, 2]
         if lower:
             offset = offset + up * (sole.height - up @ offset)
@@ -83,6 +91,50 @@ def complete_contacts(
         polygon = sole.polygon if contact.polygon is None else contact.polygon
         completed.append(replace(contact, offset=(x, y, z), polygon=polygon))
     return tuple(completed)
+
+
+def sole_text(contact: Contact, sole: Sole) -> str:
+    """Size and height of a sole, as "200 x 80 mm, 35 mm under the frame"."""
+    length, width = (edge * 1e3 for edge in sole.size)
+    high = sole.height * 1e3
+    where = (
+        "at the frame"
+        if abs(high) < _AT_FRAME
+        else f"{abs(high):.3g} mm " + ("under the frame" if high < 0 else "over the frame")
+    )
+    tilt = f"; {tilt_text(contact, sole.tilt)}" if sole.tilt else ""
+    return f"{length:.0f} x {width:.0f} mm, {where}{tilt}"
+
+
+def tip_text(contact: Contact, sole: Sole) -> str:
+    """The doubt about a sole that is a small part of its foot."""
+    length, width = (edge * 1e3 for edge in sole.size)
+    foot_length, foot_width = (edge * 1e3 for edge in sole.footprint)
+    return (
+        f"contact {contact.name!r}: a sole of {length:.0f} x {width:.0f} mm was read under a foot "
+        f"of {foot_length:.0f} x {foot_width:.0f} mm. Is that the whole sole, or a tip or an edge "
+        "that reaches lowest? Give the polygon (--sole X0:X1:Y0:Y1), or a point contact."
+    )
+
+
+def soles_read(stance: Stance) -> tuple[str, ...]:
+    """The soles that a stance has from its robot's geometry, a sentence each."""
+    found = []
+    for contact in stance.contacts:
+        for geometry in get_args(Geometry):
+            if contact.kind != "surface" or contact.polygon is None:
+                continue
+            try:
+                sole = read_sole(stance.robot, contact, geometry=geometry)
+            except CopsenseError:
+                continue
+            if np.array_equal(contact.polygon, sole.polygon):
+                found.append(
+                    f"{contact.name}: sole {sole_text(contact, sole)}; read from its "
+                    f"{geometry} geometry."
+                )
+                break
+    return tuple(found)
 
 
 def sole_notes(stance: Stance) -> tuple[str, ...]:

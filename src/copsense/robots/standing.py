@@ -25,6 +25,7 @@ from copsense.robots.contact_soles import ContactAt, complete_contacts
 from copsense.robots.plausibility import check_plausible, check_size
 from copsense.robots.presets import PRESETS, preset_robot
 from copsense.robots.uprighting import base_turn, upright_contacts
+from copsense.shapes import Geometry
 from copsense.stance import Stance, check_support
 
 _UP = 0.1  # z of a plane's normal up to which it is a wall
@@ -100,6 +101,7 @@ def load_stance(
     base_rpy: Sequence[float] | Float[np.ndarray, " 3"] | None = None,
     width: float | None = None,
     contact_at: ContactAt | None = None,
+    soles: Geometry = "collision",
     package_dirs: Iterable[str | Path] = (),
     drives: Drives | None = None,
     passive: Iterable[str] = (),
@@ -123,6 +125,8 @@ def load_stance(
             and reads its polygon; ``"frame"`` keeps it at the model's frame and reads the polygon
             if it can. Default: as the preset says; for another robot ``"frame"``, with a warning
             where that is not on the sole.
+        soles: which geometry soles are read from: what collides, or what is drawn, for a URDF
+            without collision geometry.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         drives: what holds the robot's joints, instead of what its file says.
         passive: joints without a motor, beside those that have none already.
@@ -132,6 +136,8 @@ def load_stance(
     """
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
+    if soles not in get_args(Geometry):
+        raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
         given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
         if any(value is not None for value in given):
@@ -166,7 +172,7 @@ def load_stance(
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
     wanted = checked_positions(posture, "the posture's joints")
-    q = robot.configuration({**_inside(robot), **own, **wanted})
+    q = robot.configuration({**rest_positions(robot), **own, **wanted})
     q = close(robot, q, held=wanted or own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
@@ -180,7 +186,7 @@ def load_stance(
         rpy = np.array(preset.base_rpy if preset else base_turn(robot, chosen, q))
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
     check_size(Stance(robot, q, chosen, check=False))
-    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at)
+    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at, soles)
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
     return stand(robot, chosen, q, width=width)
@@ -284,7 +290,7 @@ def _settled(
     return found
 
 
-def _inside(robot: Robot) -> dict[str, float]:
+def rest_positions(robot: Robot) -> dict[str, float]:
     """Joint -> a position inside its range, for joints whose range leaves zero out [rad, m]."""
     lower, upper = robot.position_limits
     inside = {}
