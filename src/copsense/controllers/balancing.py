@@ -78,7 +78,7 @@ class BalancingController:
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
         decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
         scale = 1.0 / np.diag(np.linalg.inv(decoupled)) if gains.scaled_by_inertia else 1.0
-        self._posture_gains = kp * scale, kd * scale
+        self._posture_gains = -kp * scale, -kd * scale
         # Where each stacked force stands among the wrenches.
         m = len(self._dynamics.J)
         self._slots = np.flatnonzero(stance.unstack(np.ones(m)).ravel())
@@ -106,8 +106,7 @@ class BalancingController:
             dyn.mass * (acceleration - self._gravity), -dyn.angular_map.dot(spin)
         )
         stiffness, damping = self._posture_gains
-        posture = -stiffness * away[6:] - damping * faster[6:]
-        torques, forces = self._compute(wrench, posture)
+        torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
         wrenches = np.zeros(self._wrenches)
         wrenches.put(self._slots, forces)
         return Command(torques, wrenches)
