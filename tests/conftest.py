@@ -1,6 +1,7 @@
 """Set up before copsense is imported: one BLAS thread, and shapes of arrays checked."""
 
 import os
+from pathlib import Path
 
 # Small matrices on few cores; set before NumPy loads its BLAS.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -12,6 +13,28 @@ from support import shape_checks
 shape_checks.install()
 
 import copsense  # noqa: E402
+
+# Where several processes share the tests, each takes the next module: the longest come first, so
+# that none is left alone at the end, and before them the kernel that others need is compiled.
+LONG = (
+    "batch/postures/test_charts.py",
+    "simulation/test_sway.py",
+    "comparison/test_trials.py",
+    "test_documents.py",
+    "comparison/test_benchmark_run.py",
+    "simulation/test_disturbances.py",
+    "simulation/test_motion.py",
+    "simulation/test_balance_command.py",
+    "paper/report/test_report.py",
+    "paper/report/test_browser.py",
+    "maps/test_cluster.py",
+    "test_design.py",
+)
+
+
+def pytest_collection_modifyitems(items):
+    rank = {Path(__file__).parent / name: number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: rank.get(item.path, len(LONG)))
 
 
 def pytest_runtest_setup(item):

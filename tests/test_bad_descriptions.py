@@ -98,7 +98,7 @@ def test_a_urdf_without_links_and_one_that_is_no_tree_say_so(load):
         ('axis="1 0 0"', 'axis="sideways"', "axis='sideways' in the joint of body 'left'"),
         ('mass="2"', 'mass="nan"', "mass='nan' in the inertial of body 'base'"),
         ('pos="0 0.1 -0.5"', 'pos="0 0.1"', "3 finite numbers"),
-        ('type="hinge"', 'type="rubber"', "Unknown joint type"),
+        ('type="hinge"', 'type="rubber"', "invalid keyword: 'rubber'"),
     ],
 )
 def test_a_fault_of_an_mjcf_is_named(old, new, said):

@@ -7,6 +7,8 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
+import copsense
+from copsense import solve_equilibrium
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import NO_LIMITS, Limits, limit_rows
 
@@ -71,3 +73,47 @@ def test_rows_are_made_once_for_a_path(icub):
     assert limit_rows(moved, Limits()) is not rows
     for array in (rows.matrix, rows.bound, rows.torque):
         assert not array.flags.writeable
+
+
+def test_limits_of_one_contact_are_not_those_of_another(icub):
+    """A hand may pull and have a friction of its own; contacts left out are not limited so."""
+    hand = icub.with_contacts([*icub.contacts, copsense.Contact("l_hand", kind="point")])
+    names = hand.contact_names
+    limits = Limits(
+        normal_force={names[0]: 10.0, "l_hand": -5.0},
+        friction={names[1]: 0.4},
+        cop_margin={names[0]: 0.01},
+        torsion=None,
+    )
+    rows = limit_rows(hand, limits)
+    owners = {
+        kind: {names[k] for k, x in zip(rows.contacts, rows.kinds, strict=True) if x == kind}
+        for kind in set(rows.kinds)
+    }
+    assert owners == {
+        "normal force": {names[0], "l_hand"},
+        "friction": {names[1]},
+        "cop": {names[0]},
+    }
+    found = solve_equilibrium(hand, copsense.minimum_wrench(1.0), limits)
+    assert found.wrenches[2, 2] >= -5.0 - 1e-9
+    assert found.wrenches[0, 2] >= 10.0 - 1e-9
+    assert Limits.from_dict(limits.to_dict()) == limits
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"normal_force": {"l_hand": np.nan}}, "l_hand"),
+        ({"friction": {"l_sole": -0.1}}, "non-negative"),
+        ({"cop_margin": {"l_sole": -0.1}}, "l_sole"),
+    ],
+)
+def test_bad_limits_of_a_contact_name_it(given, said):
+    with pytest.raises(InvalidInputError, match=said):
+        Limits(**given)
+
+
+def test_a_limit_of_an_unknown_contact_is_an_error(icub):
+    with pytest.raises(UnknownNameError, match="l_sole"):
+        limit_rows(icub, Limits(normal_force={"l_foot": 0.0}))

@@ -201,3 +201,12 @@ def test_a_policy_and_limits_are_rejected_before_anything_is_solved(icub):
     assert not seen
     with pytest.raises(copsense.CopsenseError, match="limits apply to a Criterion"):
         copsense.cop_sensitivity(icub, policy, copsense.Limits())
+
+
+def test_a_sweep_gives_back_limits_that_are_infinite(stance_of):
+    path = copsense.lateral_sweep(stance_of("four_bar"), 0.0, 0.01, 2)
+    for torque in (np.inf, {"l_hip": np.inf, "r_hip": 3.0}):
+        limits = copsense.Limits(friction=None, torque=torque)
+        found = copsense.sweep(path, [TORQUE], limits)
+        assert found.limits == limits
+        assert repr(found)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from copsense.arrays import finite_array
 from copsense.contact import Plane
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
+from copsense.polygon import EdgeMargin, Polygon
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
@@ -26,6 +27,16 @@ def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
         raise UnloadedContactError(equilibrium.unloaded)
     w = equilibrium.wrenches
     return np.array([-w[:, 4] / w[:, 2], w[:, 3] / w[:, 2]]).T
+
+
+def edge_margin(polygon: ArrayLike, point: ArrayLike) -> EdgeMargin:
+    """How far a centre of pressure is inside a sole, and the edge that is nearest.
+
+    Args:
+        polygon: vertices (k, 2) of the sole, in any order, such as `Contact.polygon` [m].
+        point: (2,) in the same axes [m].
+    """
+    return Polygon.hull(polygon).margin(point)
 
 
 def center_of_pressure(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -31,39 +30,19 @@ class Description:
         language: ``"urdf"`` or ``"mjcf"``.
         package_dirs: folders in which ``package://`` meshes are looked up.
         path: the file the text came from, if any.
-        altered: whether the text is no longer the file's (see `_one_joint_a_body`).
         notes: what the text says and is not used, a sentence each; `Robot.notes` holds them.
+        frames: names of bodies, sites or joints of the robot that is meant, where an MJCF holds
+            several things.
+        root: name of a body of the robot that is meant, or None.
     """
 
     text: str = field(repr=False)
     language: Language
     package_dirs: tuple[str, ...] = ()
     path: Path | None = None
-    altered: bool = False
     notes: tuple[str, ...] = ()
-
-
-class mjcf_file:  # noqa: N801 - a context manager, used like a function
-    """A path that holds an MJCF text, which the parser wants: its own file or a temporary one."""
-
-    def __init__(self, description: Description) -> None:
-        """Remember what to write."""
-        self.description = description
-        self.folder: tempfile.TemporaryDirectory[str] | None = None
-
-    def __enter__(self) -> str:
-        """Return the path."""
-        if self.description.path is not None and not self.description.altered:
-            return str(self.description.path)
-        self.folder = tempfile.TemporaryDirectory()
-        path = Path(self.folder.name) / "model.xml"
-        path.write_text(self.description.text, encoding="utf-8")
-        return str(path)
-
-    def __exit__(self, *_: object) -> None:
-        """Remove the temporary file."""
-        if self.folder is not None:
-            self.folder.cleanup()
+    frames: tuple[str, ...] = ()
+    root: str | None = None
 
 
 def is_file(path: Path) -> bool:
@@ -86,6 +65,9 @@ def load_description(
     source: str | Path,
     language: Language | None = None,
     package_dirs: Iterable[str | Path] = (),
+    *,
+    frames: Iterable[str] = (),
+    root: str | None = None,
 ) -> Description:
     """Read a description and check what its parser would ignore without a word.
 
@@ -93,6 +75,8 @@ def load_description(
         source: path of the file, or the XML itself.
         language: what it must be; None takes what its first element says.
         package_dirs: folders that hold the packages of ``package://`` meshes.
+        frames: as of `Description`.
+        root: as of `Description`.
 
     Raises:
         ModelLoadError: the file is missing, or is not a valid URDF or MJCF; the message says why.
@@ -108,19 +92,19 @@ def load_description(
         what = f"{path} is a folder" if is_folder(path) else f"no file at {str(source)[:300]!r}"
         raise ModelLoadError(f"{what}. Give the path of a {kind} file, or its text.")
     name = str(path or "the text given")
-    text, root = _parse(source if path is None else path, name, kind)
-    spaced = without_namespace(root)
-    found = next((known for known, tag in _ROOTS.items() if tag == root.tag), None)
+    text, document = _parse(source if path is None else path, name, kind)
+    spaced = without_namespace(document)
+    found = next((known for known, tag in _ROOTS.items() if tag == document.tag), None)
     if found is None or found != (language or found):
         starts = " and ".join(
             f"{known.upper()} with <{_ROOTS[known]}>"
             for known in ([language] if language else _ROOTS)
         )
         hint = f"Use load_robot or Robot.from_{found} for this one." if found else "Give such one."
-        raise ModelLoadError(f"{name} starts with <{root.tag}>, {starts}. {hint}")
-    if xacro := xacro_left(root) if found == "urdf" else ():
+        raise ModelLoadError(f"{name} starts with <{document.tag}>, {starts}. {hint}")
+    if xacro := xacro_left(document) if found == "urdf" else ():
         raise _unexpanded(name, xacro)
-    faults = list(urdf_faults(root) if found == "urdf" else _mjcf_faults(root))
+    faults = list(urdf_faults(document) if found == "urdf" else _mjcf_faults(document))
     if faults:
         more = f" (and {len(faults) - 5} more)" if len(faults) > 5 else ""
         raise ModelLoadError(
@@ -129,13 +113,10 @@ def load_description(
         )
     notes: tuple[str, ...] = ()
     if found == "urdf":
-        notes = (*take_out_base(root), *urdf_notes(root))
-        altered = spaced or bool(notes)
-    else:
-        altered = _one_joint_a_body(root, path)
-    if altered:
-        text = ET.tostring(root, encoding="unicode")
-    return Description(text, found, tuple(map(str, package_dirs)), path, altered, notes)
+        notes = (*take_out_base(document), *urdf_notes(document))
+    if spaced or notes:
+        text = ET.tostring(document, encoding="unicode")
+    return Description(text, found, tuple(map(str, package_dirs)), path, notes, tuple(frames), root)
 
 
 def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
@@ -173,38 +154,6 @@ def _unexpanded(name: str, left: tuple[str, ...]) -> ModelLoadError:
         f"{name} is a xacro file that was not expanded: it holds {', '.join(left[:3])}{more}, "
         "which no URDF parser reads. Expand it with xacro first: xacro FILE > robot.urdf."
     )
-
-
-def _one_joint_a_body(root: ET.Element, path: Path | None) -> bool:
-    """Give each joint of an MJCF body with several a body of its own; whether any had.
-
-    Pinocchio makes one composite joint of them, which has no single angle to name and whose
-    derivatives it does not know. Nested bodies without mass move alike, joint by joint.
-    """
-    altered = False
-    for body in list(root.iterfind("worldbody//body")):
-        joints = [child for child in body if child.tag == "joint" and child.get("type") != "free"]
-        if len(joints) < 2:
-            continue
-        altered = True
-        name, rest = body.get("name", "body"), [c for c in body if c not in joints[:-1]]
-        inner = body
-        for child in list(body):
-            body.remove(child)
-        for number, joint in enumerate(joints[:-1]):
-            inner.set("name", f"{name}/{joint.get('name', number)}")
-            inner.append(joint)
-            inner = ET.SubElement(inner, "body")
-        inner.set("name", name)  # the last carries the joint, the shapes and the children
-        inner.extend(rest)
-    if altered and path is not None:
-        # Read from elsewhere now: what was relative to the file stays so.
-        compilers = root.findall("compiler") or [ET.SubElement(root, "compiler")]
-        for compiler in compilers:
-            for folder in ("meshdir", "texturedir", "assetdir"):
-                if folder == "meshdir" or compiler.get(folder):
-                    compiler.set(folder, str((path.parent / compiler.get(folder, "")).absolute()))
-    return altered
 
 
 def _mjcf_faults(root: ET.Element) -> Iterator[str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -17,6 +17,7 @@ from copsense.criterion import (
     weighted_torque,
 )
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
+from copsense.json_data import json_data
 from copsense.limits import Limits
 from copsense.margins import margin_table
 from copsense.path import PosturePath
@@ -31,6 +32,7 @@ _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
 _AT_BOUND = 1e-2  # of a parameter's logarithm: the search's resolution
 _SIMPLEX = (0.5, 0.1, 0.02)  # first steps of the searches, in steps of the grid
+_SAME = 1e-6  # relative: less is not a gain
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
@@ -90,6 +92,8 @@ class Design:
         objective: ``"travel"`` or ``"gain"``.
         family: name of the family.
         at_bound: parameters whose best value is a bound of the family: farther out may be better.
+        robot: name of the robot.
+        notes: what to know about it, such as what of its file is not used.
     """
 
     criterion: Criterion
@@ -101,6 +105,43 @@ class Design:
     objective: Objective
     family: str
     at_bound: tuple[str, ...]
+    robot: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """What the designed criterion is worth beside the better of the paper's two."""
+        if self.objective == "gain":
+            best = min(self.baselines, key=lambda s: s.worst_gain)
+            change = self.score.worst_gain / best.worst_gain - 1 if best.worst_gain > 0 else 0.0
+            better, what = change < -_SAME, "worst gain"
+        else:
+            best = max(self.baselines, key=lambda s: s.travel)
+            own = self.score.travel
+            if best.travel == 0:
+                beyond = "the paper's two are beyond a limit in the middle already"
+                return f"{own * 1e3:.1f} mm, where {beyond}"
+            change = own / best.travel - 1
+            better, what = change > _SAME, "travel"
+        if better:
+            return f"{what} {change * 100:+.0f} % over the better of the paper's two"
+        found = f"{what} {change * 100:+.1f} %"
+        return f"no better than {best.criterion} ({found}): keep {best.criterion}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense design --json`` prints: plain data, a `Score` as its fields."""
+        data = {
+            "robot": self.robot,
+            "family": self.family,
+            "objective": self.objective,
+            "best": asdict(self.score),
+            "at_bound": self.at_bound,
+            "baselines": [asdict(s) for s in self.baselines],
+            "alternatives": [asdict(s) for s in self.alternatives],
+            "pareto": [asdict(s) for s in self.pareto],
+            "notes": self.notes,
+        }
+        return dict(json_data(data))
 
 
 def design_criterion(
@@ -177,6 +218,8 @@ def design_criterion(
         objective,
         family.name,
         at_bound,
+        path.stances[0].robot.name,
+        path.stances[0].robot.notes,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -102,6 +103,14 @@ class LabelledResult:
         return MappingProxyType(dict(self._dataset.attrs))
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know about the robot, such as what of its file is not used.
+
+        Empty for a file of an earlier version, which did not record it.
+        """
+        return tuple(map(str, json.loads(self.attrs.get("notes", "[]"))))
+
+    @property
     def sizes(self) -> Mapping[str, int]:
         """Dimension -> size."""
         return {str(name): size for name, size in self._dataset.sizes.items()}
@@ -128,6 +137,10 @@ class LabelledResult:
 
     def to_pandas(self) -> pd.DataFrame:
         """A tidy table."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a person wants to know first, as plain data: None for what is infinite."""
         raise NotImplementedError
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:

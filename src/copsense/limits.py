@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.arrays import array_property, owned, read_only
+from copsense.arrays import array_property, finite_number, owned, read_only
 from copsense.contact import Contact
 from copsense.content import ByContent, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -30,10 +30,12 @@ TorqueLimits = Literal["model"] | Mapping[str, float] | float
 class Limits(ByContent):
     """What contact wrenches and torques must respect; None switches a limit off.
 
-    Limits are given by keyword; they compare and hash by content.
+    Limits are given by keyword; they compare and hash by content. The first three may be a mapping,
+    contact's name -> value; a contact that it does not name is not limited so.
 
     Attributes:
-        normal_force: least normal force of every contact [N].
+        normal_force: least normal force of every contact [N]; in a mapping negative where a
+            contact may pull, such as a hand that grips.
         friction: Coulomb coefficient of every contact; ``"contact"`` takes the contacts' own and
             leaves those without one unlimited; None switches friction off.
         friction_sides: sides of the pyramid inscribed in the friction cone, at least 3.
@@ -47,10 +49,10 @@ class Limits(ByContent):
             `Robot.effort_limits`) do not count as limits: `torque_placeholders` names them.
     """
 
-    normal_force: float | None = 0.0
-    friction: float | Literal["contact"] | None = "contact"
+    normal_force: float | Mapping[str, float] | None = 0.0
+    friction: float | Mapping[str, float] | Literal["contact"] | None = "contact"
     friction_sides: int = 8
-    cop_margin: float | None = 0.0
+    cop_margin: float | Mapping[str, float] | None = 0.0
     torsion: float | Literal["contact", "cone"] | None = "contact"
     torque: TorqueLimits | None = None
 
@@ -63,12 +65,11 @@ class Limits(ByContent):
                 allowed = {"friction": ("contact",), "torsion": ("contact", "cone")}.get(name, ())
                 if value not in allowed:
                     raise UnknownNameError(f"{name} limit", value, allowed)
-            elif value is not None and not (np.isfinite(value) and value >= 0):
-                raise InvalidInputError(
-                    f"limit {name} must be a non-negative number or None, got {value}."
-                )
+            elif isinstance(value, Mapping) and name != "torsion":
+                each = {contact: _bound(name, bound, contact) for contact, bound in value.items()}
+                object.__setattr__(self, name, own(each))
             elif value is not None:
-                object.__setattr__(self, name, float(value))
+                object.__setattr__(self, name, _bound(name, value))
         sides: object = self.friction_sides
         number = float(sides) if isinstance(sides, int | float | np.integer) else float("nan")
         if not (number >= 3 and number.is_integer()):
@@ -130,6 +131,20 @@ class Limits(ByContent):
             v is not None
             for v in (self.normal_force, self.friction, self.cop_margin, self.torsion, self.torque)
         )
+
+
+def _bound(name: str, value: object, contact: str = "") -> float:
+    """A limit's number; only the normal force of a named contact may be negative."""
+    what = f"limit {name}" + (f" of contact {contact!r}" if contact else "")
+    number = finite_number(value, what)
+    if number < 0 and not (contact and name == "normal_force"):
+        raise InvalidInputError(f"{what} must be a non-negative number or None, got {value}.")
+    return number
+
+
+def _of(limit: float | Mapping[str, float] | None, contact: Contact) -> float | None:
+    """What a limit is for one contact."""
+    return limit.get(contact.name) if isinstance(limit, Mapping) else limit
 
 
 NO_LIMITS = Limits(normal_force=None, friction=None, cop_margin=None, torsion=None)
@@ -224,6 +239,12 @@ def rows_of(
     joints: tuple[str, ...],
 ) -> LimitRows:
     """The same of contacts and joints' torque limits (n,) alone, forces stacked in their order."""
+    known = [contact.name for contact in contacts]
+    for what in ("normal_force", "friction", "cop_margin"):
+        given = getattr(limits, what)
+        for name in given if isinstance(given, Mapping) else ():
+            if name not in known:
+                raise UnknownNameError(f"contact in the limit {what}", name, known)
     matrix, bound, names, owners, kinds, normals = [], [], [], [], [], []
     m = sum(len(contact.components) for contact in contacts)
     start = 0
@@ -286,16 +307,18 @@ Row = tuple[str, str, Float[np.ndarray, " 6"], float]
 def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
     """Rows of one contact over its six components: kind, name, normal, bound."""
     rows: list[Row] = []
-    if limits.normal_force is not None:
-        rows.append(("normal force", "normal force", _unit(2) * -1.0, -limits.normal_force))
+    least = _of(limits.normal_force, contact)
+    if least is not None:
+        rows.append(("normal force", "normal force", _unit(2) * -1.0, -least))
     mu = contact.friction
     if not isinstance(limits.friction, str):
-        mu = limits.friction
+        mu = _of(limits.friction, contact)
     if mu is not None:
         rows += _pyramid_rows(contact, mu, limits.friction_sides)
-    if limits.cop_margin is not None and contact.sole:
-        _require_room(contact, contact.sole, limits.cop_margin)
-        rows += _cop_rows(contact, contact.sole, limits.cop_margin)
+    margin = _of(limits.cop_margin, contact)
+    if margin is not None and contact.sole:
+        _require_room(contact, contact.sole, margin)
+        rows += _cop_rows(contact, contact.sole, margin)
     if limits.torsion == "cone" and contact.kind == "surface":
         rows += _cone_rows(contact, mu, limits.friction_sides)
     torsion = contact.torsional_friction

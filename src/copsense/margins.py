@@ -40,7 +40,7 @@ class LimitMargin:
 def limit_margins(equilibrium: StaticEquilibrium, limits: Limits) -> tuple[LimitMargin, ...]:
     """The margin of every contact and joint to every kind of limit, the smallest row of each."""
     table = margin_table(equilibrium.stance, limits)
-    values = table.values(equilibrium.forces, equilibrium.torques)
+    values = table.values(equilibrium.contact_forces, equilibrium.torques)
     return tuple(table.margin(rows, values) for rows in table.groups)
 
 

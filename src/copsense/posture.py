@@ -167,6 +167,31 @@ def solve_posture(
     raise UnreachablePostureError(_what_remains(stance, h, axes, list(joints), wanted))
 
 
+def carry_payload(
+    stance: Stance,
+    frame: str,
+    mass: float,
+    *,
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Stance:
+    """A stance whose robot carries a mass, its CoM over the same point as before.
+
+    Args:
+        stance: the stance; its contacts stay.
+        frame: name of the frame that carries it.
+        mass: [kg].
+        com: centre of the mass in the frame [m].
+
+    Raises:
+        UnknownNameError: no such frame.
+        UnreachablePostureError: the robot cannot bring the CoM of both there.
+    """
+    robot, (x, y, _) = stance.robot.with_payload(frame, mass, com=com), stance.com
+    loaded = Stance(robot, stance.q, stance.contacts, loads=stance.loads)
+    ahead = float(x) if robot.base_nv == 6 else None  # a planar robot has no x to keep
+    return solve_posture(loaded, com=(ahead, float(y), None)).stance
+
+
 def retract(stance: Stance, displacement: Float[np.ndarray, " nv"]) -> Stance:
     """Move a stance along a velocity, then back to where its contacts are.
 

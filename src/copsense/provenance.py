@@ -55,6 +55,15 @@ def plain(value: object) -> Any:
     )
 
 
+def read_plain(value: Any) -> Any:
+    """What `plain` wrote, its infinities and NaN as numbers again."""
+    if isinstance(value, Mapping):
+        return {name: read_plain(part) for name, part in value.items()}
+    if isinstance(value, list):
+        return [read_plain(part) for part in value]
+    return float(value) if value in ("inf", "-inf", "nan") else value
+
+
 def digest(parameters: object) -> str:
     """SHA-256 of plain data."""
     return hashlib.sha256(json.dumps(parameters, sort_keys=True).encode()).hexdigest()
@@ -136,7 +145,7 @@ def made_by(
     Returns:
         ``criteria``: JSON of `Criterion.to_dict` for each, or ``{"policy": name}``; ``limits``:
         JSON of the limits, ``"null"`` without; ``model_digest``: of the robot and its contacts'
-        frames; ``contacts``: JSON of the contacts.
+        frames; ``contacts``: JSON of the contacts; ``notes``: JSON of the robot's notes.
     """
     return {
         "criteria": json.dumps(
@@ -145,6 +154,7 @@ def made_by(
         "limits": json.dumps(plain(limits)),
         "contacts": json.dumps(plain(stance.contacts)),
         "model_digest": model_digest(stance),
+        "notes": json.dumps(list(stance.robot.notes)),
     }
 
 

@@ -14,9 +14,10 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from copsense.arrays import array_property, finite_array, finite_number, read_only
-from copsense.description import Description, load_description, mjcf_file
+from copsense.description import Description, load_description
 from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
@@ -59,6 +60,7 @@ class Robot:
         notes: what its description says and copsense does not use, a sentence each; every command
             prints them.
         drives: which joints have motors, springs and couplings, and the loops among its links.
+        mjcf: what was read from an MJCF, with every joint of the file; None for other robots.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Robot:
     description: Description | None = None
     notes: tuple[str, ...] = ()
     drives: Drives = field(default_factory=Drives)
+    mjcf: MjcfReading | None = None
 
     def __post_init__(self) -> None:
         """Reject a model that has no floating base, or whose masses make no sense."""
@@ -162,10 +165,28 @@ class Robot:
 
     @classmethod
     def from_mjcf(
-        cls, source: str | Path, *, name: str | None = None, package_dirs: Iterable[str | Path] = ()
+        cls,
+        source: str | Path,
+        *,
+        name: str | None = None,
+        frames: Iterable[str] = (),
+        root: str | None = None,
     ) -> Robot:
-        """Read an MJCF file or its text, as `from_urdf`; a base without joint gets a free-flyer."""
-        description = load_description(source, "mjcf", package_dirs)
+        """Read an MJCF file or its text, as MuJoCo compiles it; a base that is fixed floats.
+
+        Args:
+            source: path of the file, or the XML itself.
+            name: the robot's name; default the one in the file.
+            frames: frames of the robot that is meant, where the file holds several things.
+            root: name of a body of the robot that is meant.
+
+        Raises:
+            ModelLoadError: the file is missing or not an MJCF, or it takes MuJoCo to read it and
+                MuJoCo is not installed.
+            InvalidInputError: several robots could be meant.
+            UnknownNameError: it has no body named `root`.
+        """
+        description = load_description(source, "mjcf", frames=frames, root=root)
         return cls.from_description(description, name=name)
 
     @classmethod
@@ -222,8 +243,12 @@ class Robot:
     @classmethod
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
-        model = build_model(description)
-        return cls(name or model.name or "robot", model, description, description.notes)
+        if description.language == "urdf":
+            model = _build_urdf(description)
+            return cls(name or model.name or "robot", model, description, description.notes)
+        read = read_mjcf(description)
+        notes = (*description.notes, *read.notes)
+        return cls(name or read.model.name or "robot", read.model, description, notes, mjcf=read)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.
@@ -538,25 +563,17 @@ class JointForce:
         return self.torque - self.stiffness * (now - self.rest)
 
 
-def build_model(description: Description) -> pin.Model:
-    """The Pinocchio model of a description, with a floating base."""
+def _build_urdf(description: Description) -> pin.Model:
+    """The Pinocchio model of a URDF, with a floating base."""
     said: list[str] = []
     try:
-        if description.language == "urdf":
-            with caught_parser_output() as said:
-                return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
-        with mjcf_file(description) as path:
-            model = pin.buildModelFromMJCF(path)
-            if model.njoints > 1 and model.joints[1].shortname() in _FLOATING:
-                return model
-            base = pin.JointModelFreeFlyer()
-            return pin.buildModelAndLegacyConstraintsFromMJCF(path, base, "root_joint")[0]
+        with caught_parser_output() as said:
+            return pin.buildModelFromXML(description.text, pin.JointModelFreeFlyer())
     except (ValueError, RuntimeError, LookupError) as error:
         what = description.path or "the text given"
         reason = str(error).strip().splitlines()[-1] if str(error).strip() else "no reason given"
         if said:  # the parser's own reason, which its exception does not hold
             reason = "; ".join(said)
         raise ModelLoadError(
-            f"{what} is not a readable {description.language.upper()}: {reason.rstrip('.')}. "
-            "Correct the file."
+            f"{what} is not a readable URDF: {reason.rstrip('.')}. Correct the file."
         ) from None

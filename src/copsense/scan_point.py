@@ -37,7 +37,7 @@ class ScanPoint:
     @property
     def forces(self) -> Float[np.ndarray, " m"]:
         """Stacked contact forces, contact axes [N, Nm]."""
-        return self.equilibrium.forces
+        return self.equilibrium.contact_forces
 
     @property
     def torques(self) -> Float[np.ndarray, " n"]:
@@ -47,7 +47,7 @@ class ScanPoint:
     @property
     def force_rates(self) -> Float[np.ndarray, " m"]:
         """d forces / d coordinate."""
-        return self._derivatives[0][:, 0]
+        return self._derivatives[0][: len(self.forces), 0]
 
     @property
     def torque_rates(self) -> Float[np.ndarray, " n"]:

@@ -12,9 +12,10 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact
-from copsense.description import Description, mjcf_file
+from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.meshes import find_mesh
+from copsense.mjcf.geometry import geometry_objects
 from copsense.parser_output import caught_parser_output
 from copsense.polygon import Polygon
 from copsense.robot import Robot
@@ -140,20 +141,24 @@ def _read_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
             "polygon, or load the robot from its URDF or MJCF."
         )
     # Unreduced: geometry hangs on the joints of the file.
-    whole = Robot.from_description(description, name=robot.name)
+    whole = (
+        Robot.from_description(description, name=robot.name)
+        if robot.mjcf is None
+        else Robot(robot.name, robot.mjcf.model, description)
+    )
     model, at_frame = whole.model, replace(contact, offset=(0.0, 0.0, 0.0)).on(whole)
     joint, axes = at_frame.joint, at_frame.placement
     text = ""
-    if description.language == "urdf":
+    if robot.mjcf is None:
         links = {f.name for f in model.frames if f.parentJoint == joint}
         text = _only_collisions_of(description, links)
     try:
-        if description.language == "urdf":
+        if robot.mjcf is None:
             with caught_parser_output():  # the reason is in the exception
-                shapes = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+                read = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+            shapes = list(read.geometryObjects)
         else:
-            with mjcf_file(description) as path:
-                shapes = pin.buildGeomFromMJCF(model, path, pin.GeometryType.COLLISION)
+            shapes = geometry_objects(robot.mjcf, description)
     except (ValueError, RuntimeError) as error:
         reason = str(error).strip().splitlines()[0].rstrip(".")
         raise ModelLoadError(
@@ -161,7 +166,7 @@ def _read_vertices(robot: Robot, contact: Contact) -> Float[np.ndarray, "k 3"]:
             "Give package_dirs= (--package-dir) for its meshes, or the contact's polygon."
         ) from None
     found = []
-    for shape in shapes.geometryObjects:
+    for shape in shapes:
         if shape.parentJoint == joint:
             place = axes.actInv(shape.placement)
             found.append(_shape_vertices(shape, axes) @ place.rotation.T + place.translation)
@@ -190,6 +195,11 @@ def _shape_vertices(shape: pin.GeometryObject, axes: pin.SE3) -> Float[np.ndarra
         down = -(shape.placement.rotation.T @ axes.rotation[:, 2]) * geometry.radius
         end = geometry.halfLength if isinstance(geometry, coal.Capsule) else 0.0
         return np.array([[0.0, 0.0, end], [0.0, 0.0, -end]]) + down
+    if isinstance(geometry, coal.Ellipsoid):
+        # Its lowest point, where the outward normal is straight down.
+        down = shape.placement.rotation.T @ -axes.rotation[:, 2]
+        radii = np.array(geometry.radii)
+        return (radii**2 * down / np.linalg.norm(radii * down))[None]
     if isinstance(geometry, coal.BVHModelBase):
         return np.array(geometry.vertices())
     if isinstance(geometry, coal.ConvexBase):

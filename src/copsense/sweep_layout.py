@@ -134,6 +134,8 @@ def sweep_dataset(path: PosturePath, rows: SweepRows, attributes: Mapping[str, s
     }
     taken = {*data, *coordinates, *(d for dims, *_ in data.values() for d in dims)}
     coordinate = variable_name(path.coordinate, taken)
+    if _dof_dimension(stance) == "dof":
+        coordinates["dof"] = list(stance.robot.dof_names)
     coordinates[coordinate] = (
         "posture",
         path.values,
@@ -170,6 +172,11 @@ def variable_name(name: str, taken: set[str]) -> str:
     return plain
 
 
+def _dof_dimension(stance: Stance) -> str:
+    """The dimension of the joints' degrees of freedom: that of the torques, if all have motors."""
+    return "joint" if stance.robot.dof_names == stance.robot.torque_names else "dof"
+
+
 def _sizes(stance: Stance) -> dict[str, int]:
     return {
         "contact": len(stance.contacts),
@@ -200,7 +207,7 @@ def _of_postures(path: PosturePath) -> dict[str, Any]:
             {"long_name": f"d configuration / d {path.coordinate}, base in its own frame"},
         ),
         "joint_limit_excess": (
-            "joint",
+            _dof_dimension(path.stances[0]),
             np.array([s.joint_limit_excess for s in path.stances]),
             {"units": "rad, m", "long_name": "how far the joint is beyond the model's limits"},
         ),

@@ -12,10 +12,11 @@ import numpy as np
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, InvalidInputError
 from copsense.extras import require
+from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits
 from copsense.path import PosturePath
-from copsense.provenance import made_by
+from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
 from copsense.sweep_layout import SweepRows, sweep_dataset
@@ -83,7 +84,7 @@ class Sweep(LabelledResult):
     @property
     def limits(self) -> Limits | None:
         """The limits within which the wrenches were solved; None for none."""
-        found = json.loads(self.attrs.get("limits", "null"))
+        found = read_plain(json.loads(self.attrs.get("limits", "null")))
         if found is None:
             return None
         del found["is"]
@@ -162,6 +163,34 @@ class Sweep(LabelledResult):
             UnknownNameError: a torque limit names no joint.
         """
         return Sweep(with_limit_margins(self.to_xarray(), limits))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense sweep --json`` prints: plain data, None for what is infinite.
+
+        For each criterion over which part of the path every contact is planted (within limits: no
+        limit is active), in the unit of the coordinate, and the smallest margin on the way [m].
+        """
+        limits, coordinate = self.limits, self.coordinate
+        ranges = self.planted_range if limits is None else self.free_range
+        data: dict[str, Any] = {
+            "robot": self.attrs["robot"],
+            "coordinate": coordinate.name,
+            "unit": coordinate.attrs["units"],
+            "postures": coordinate.size,
+            "failed_rows": len(self.failed_rows),
+            "criteria": {
+                name: {
+                    "planted": ranges[name],
+                    "smallest_margin": float(self["margin"].sel(criterion=name).min()),
+                    "largest_residual": float(self["residual"].sel(criterion=name).max()),
+                }
+                for name in self.labels("criterion")
+            },
+            "limits": None if limits is None else repr(limits),
+            "without_sole": self.attrs["without_sole"],
+            "notes": list(self.notes),
+        }
+        return dict(json_data(data))
 
     def to_pandas(self) -> pd.DataFrame:
         """A tidy table: a row per posture, criterion and contact."""

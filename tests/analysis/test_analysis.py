@@ -153,6 +153,45 @@ def test_what_is_not_a_stance_or_a_list_of_criteria_is_rejected(icub):
         unchecked(icub, copsense.minimum_torque())
 
 
+OFF = {"normal_force": None, "friction": None, "cop_margin": None, "torsion": None}
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        copsense.Limits(**OFF, torque={}),
+        copsense.Limits(**OFF, torque="model"),  # placeholders, all of them
+        copsense.Limits(**OFF | {"torsion": "contact"}),  # its contacts have no coefficient
+    ],
+    ids=["no joint", "placeholders", "no coefficient"],
+)
+def test_limits_that_limit_nothing_are_met_nowhere_and_a_note_says_so(stance_of, limits):
+    criteria = [copsense.minimum_wrench(1.0)]
+    found = copsense.analyse(stance_of("four_bar"), criteria, limits)
+    assert limits.any
+    assert found.verdict == "minimum-wrench meets no limit within reach."
+    assert found.verdict in repr(found)
+    assert found.verdict in found._repr_html_()
+    assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["verdict"] == found.verdict
+    assert any("limit nothing here" in note for note in found.notes)
+    free = copsense.analyse(stance_of("four_bar"), criteria)
+    assert not any("limit nothing" in note for note in free.notes)
+    (ours,), (own,) = found.equilibria.values(), free.equilibria.values()
+    np.testing.assert_allclose(ours.forces, own.forces, atol=1e-9)
+
+
+def test_the_command_and_its_regions_take_limits_that_limit_nothing(tmp_path):
+    off = "friction=off,cop-margin=off,normal-force=off"
+    answer = command(
+        "analyse", "four_bar", "--limits", off, "--regions", tmp_path / "r.png",
+        "--criterion", "minimum-wrench",
+    )  # fmt: skip
+    assert answer.code == 0, answer.err
+    assert "minimum-wrench meets no limit within reach." in answer.out
+    assert "without end" in answer.out
+    assert "limit nothing here" in answer.err
+
+
 def test_json_data_is_plain_and_finite():
     assert json_data({"a": np.array([1.0, np.inf]), "b": (np.float64(2.0), "x", True)}) == {
         "a": [1.0, None],

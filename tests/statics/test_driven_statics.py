@@ -16,14 +16,19 @@ from copsense import (
     Drives,
     Limits,
     Load,
+    PathScan,
     Robot,
     TorqueTerm,
     WrenchTerm,
+    analyse,
+    com_regions,
     cop_sensitivity,
+    lateral_sweep,
     minimum_torque,
     minimum_wrench,
     solve_equilibrium,
     solve_posture,
+    sweep,
     weighted_torque,
 )
 from copsense.cop import total_center_of_pressure
@@ -35,7 +40,10 @@ from copsense.errors import (
     UnknownNameError,
 )
 from copsense.loads import SpringLoad
+from copsense.margins import limit_margins
+from copsense.polygon import Polygon
 from copsense.posture import retract
+from copsense.regions import com_region
 from copsense.sensitivity import finite_difference_sensitivity
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.physics_settings import PhysicsSettings
@@ -278,6 +286,43 @@ def test_a_joint_that_nothing_holds_is_an_error_that_says_what_it_lacks():
     hanging = solve_posture(bent, com=(full.com[0], 0.0, None)).stance
     assert abs(hanging.balance[robot.velocity_index("forearm")]) < 1e-9
     solve_equilibrium(hanging, minimum_torque())
+
+
+def test_scans_regions_and_analyses_take_loops_and_loads_along(tmp_path):
+    stance = rods("pin").with_loads([Load("hand", (0.0, 5.0, -15.0))])
+    limits = Limits(friction=0.6, torque=25.0)
+    y = float(stance.com[1])
+    path = lateral_sweep(stance, y - 0.06, y + 0.06, 7, com_x=float(stance.com[0]))
+    for criterion in (minimum_torque(), minimum_wrench(1.0)):
+        first = PathScan(path, criterion).travel(limits).first
+        there = solve_posture(stance, com=(stance.com[0], y + first.exact, None)).stance
+        at_limit = {
+            m.name: m.value for m in limit_margins(solve_equilibrium(there, criterion), limits)
+        }
+        assert min(abs(value) for value in at_limit.values()) < 1e-6
+        # The region of the held posture has its edge where the wrenches there meet a limit.
+        region = com_regions(stance, [criterion], limits).unclipped[criterion.name]
+        assert region.contains(stance.com[:2])
+    table = sweep(path, [minimum_torque()], limits)
+    assert list(table.to_xarray()["joint"].values) == list(stance.robot.torque_names)
+    table.save(tmp_path / "sweep.nc")
+    told = analyse(stance, [minimum_torque(), minimum_wrench(1.0)], limits)
+    assert "minimum-torque" in str(told)
+
+
+def test_the_region_under_a_load_is_an_affine_image_of_the_region_without():
+    """c = (F_n p + F_z e_xy - e_z F_xy) / (m g), p over the soles (theory2.md, section 1)."""
+    stance = standing(Robot.from_model(rod_biped_model(rods=False)))
+    force, weight = np.array([6.0, 8.0, -20.0]), stance.robot.weight
+    limits = Limits(friction=None, torsion=None)
+    loaded = com_region(stance.with_loads([Load("hand", tuple(force))]), limits)
+    bare = com_region(stance, limits).polygon
+    x, y, z = frame_at(stance.robot, stance.q, "hand").translation
+    above = z - stance.placements[0].translation[2]
+    image = (weight - force[2]) * bare + force[2] * np.array([x, y]) - above * force[:2]
+    assert Polygon(image / weight).area == pytest.approx(loaded.area, rel=1e-9)
+    for corner in image / weight:
+        assert abs(loaded.margin(corner)) < 1e-7
 
 
 def test_an_open_loop_is_an_error():

@@ -15,15 +15,21 @@ from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
 from copsense.cop import total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.json_data import json_data
-from copsense.limits import Limits, torque_placeholders
+from copsense.limits import Limits, limit_rows, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
 from copsense.robots import sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance
-from copsense.statics import StaticEquilibrium, WrenchPolicy, policy_name
+from copsense.statics import (
+    StaticEquilibrium,
+    WrenchPolicy,
+    policy_name,
+    solve_equilibrium,
+    with_tie_break,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -217,6 +223,7 @@ def analyse(
     posture = solve_posture(stance, com=(x, y, None), joints=joints)
     here, tangent = posture.stance, posture.tangents[:, 0 if x is None else 1]
     within = limits if limits is not None and limits.any else None
+    chosen, tied = _determined(here, chosen, within)
     found = {name: cop_sensitivity(here, c, within) for name, c in chosen.items()}
     if check:
         for criterion in chosen.values():
@@ -230,6 +237,7 @@ def analyse(
             limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
     notes = (
         *here.robot.notes,
+        *tied,
         *_limit_notes(here, within, limited),
         *sole_notes(here),
         *joint_limit_notes(here),
@@ -252,6 +260,35 @@ def _named(
     return named
 
 
+def _determined(
+    stance: Stance, criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None
+) -> tuple[dict[str, Criterion | WrenchPolicy], list[str]]:
+    """The criteria that can be told here, each with a tie-break where it needs one, and notes."""
+    found: dict[str, Criterion | WrenchPolicy] = {}
+    notes, errors = [], []
+    for name, criterion in criteria.items():
+        found[name] = criterion
+        if not isinstance(criterion, Criterion):
+            continue
+        try:
+            found[name] = tied = with_tie_break(stance, criterion)
+            if tied is not criterion and limits is not None:
+                solve_equilibrium(stance, criterion, limits)  # says why it cannot
+        except UndeterminedWrenchError as error:
+            del found[name]
+            errors.append(error)
+            notes.append(f"{name} is left out: {error}")
+            continue
+        if tied is not criterion:
+            notes.append(
+                f"{name} leaves forces undetermined that contacts exert against each other; of "
+                "these the least wrench is shown (minimum-wrench with L = 1 m as its tie-break)."
+            )
+    if not found:
+        raise errors[0]
+    return found, notes
+
+
 def _limit_notes(
     stance: Stance, limits: Limits | None, limited: Mapping[str, LimitAnalysis]
 ) -> list[str]:
@@ -260,6 +297,11 @@ def _limit_notes(
         notes.append(
             "no torque limit in the model (a placeholder) for: "
             + ", ".join(torque_placeholders(stance))
+        )
+    if limits is not None and not limit_rows(stance, limits).all_names:
+        notes.append(
+            "the limits that are switched on limit nothing here: they need a friction coefficient, "
+            "a sole or a torque bound that this stance does not have."
         )
     return notes + [
         f"the limits that {name} presses here are degenerate: the next change of them cannot be "

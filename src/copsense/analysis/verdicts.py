@@ -49,9 +49,12 @@ def _within_limits(data: dict[str, Any]) -> str:
     """The same of the first limit met to either side, found along the path."""
     reach = {
         name: min(
-            (math.inf if t["exact"] is None else t["exact"], t["name"])
-            for travels in row["limit_travel"].values()
-            for t in travels
+            (
+                (math.inf if t["exact"] is None else t["exact"], t["name"])
+                for travels in row["limit_travel"].values()
+                for t in travels
+            ),
+            default=(math.inf, ""),  # limits that limit nothing at this stance
         )
         for name, row in data["criteria"].items()
     }

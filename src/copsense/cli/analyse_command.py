@@ -10,7 +10,7 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
-from copsense.cli.region_text import region_data, region_lines, save_regions
+from copsense.cli.region_text import region_lines, save_regions
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import LENGTH, read_positions
 from copsense.errors import InvalidInputError
@@ -101,7 +101,7 @@ def analyse(
     if regions is not None:
         assert within is not None
         found = save_regions(analysis.stance, chosen, within, regions, overwrite=force)
-        answer["regions"] = {"plot": regions, "of": region_data(found, analysis.stance)}
+        answer["regions"] = {"plot": regions, "of": found.to_dict()}
     if picture is not None:
         from copsense.plots import save_figure
 

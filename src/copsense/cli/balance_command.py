@@ -167,14 +167,13 @@ def balance(
 
         with progress_bar(None, "filming", "frame") as update:
             write_video(stance, recording, video, overwrite=force, progress=update)
-    summary = _summary(recording)
     if as_json:
-        echo_json(summary | {"notes": list(stance.robot.notes)})
+        echo_json(recording.to_dict())
     else:
-        _print(summary)
+        _print(recording)
         echo_written(output, picture, video)
     codes = {"completed": 0, "stopped": 130}
-    click.get_current_context().exit(codes.get(summary["end"]["kind"], 1))
+    click.get_current_context().exit(codes.get(recording.end.kind, 1))
 
 
 @contextmanager
@@ -194,71 +193,34 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _summary(recording: Recording) -> dict[str, Any]:
-    """What a person wants to know of a run; tracking and torques are those before a tip."""
+def _print(recording: Recording) -> None:
     attributes, end, tip = recording.attrs, recording.end, recording.tip
-    torque = recording.before_first_tip["torque"]
-    return {
-        "robot": attributes["robot"],
-        "controller": attributes["controller"],
-        "end": {"kind": end.kind, "reason": end.message, "time": end.time},
-        "com_error_rms": recording.tracking_error,
-        "com_error_peak": recording.tracking_peak,
-        "smallest_margin": recording.smallest_margin,
-        "torque_norm_mean": float(((torque**2).sum("joint") ** 0.5).mean()),
-        "torque_peak": float(abs(torque).max()),
-        "first_tip": None
-        if tip is None
-        else {
-            "contact": tip.contact,
-            "reason": tip.message,
-            "time": tip.time,
-            "com_y_from_start": recording.tip_travel,
-        },
-        "static_prediction": {
-            "excursion": attributes.get("static_excursion", math.nan),
-            "contact": attributes.get("static_contact", ""),
-            "how": attributes.get("static_how", ""),
-            "reach": attributes.get("static_reach", math.nan),
-            "statement": attributes.get("static_statement", ""),
-        },
-        "quasi_static": {
-            name: attributes.get(f"quasi_static_{name}", math.nan)
-            for name in ("lever", "excess", "share", "frequency")
-        },
-    }
-
-
-def _print(summary: dict[str, Any]) -> None:
-    end, tip, static = summary["end"], summary["first_tip"], summary["static_prediction"]
-    through = tip and end["kind"] == "completed"
+    through = tip and recording.completed
     click.echo(
-        f"{summary['robot']} under {summary['controller']}: {end['reason'].rstrip('.')}, "
-        f"{end['time']:.2f} s{', though a contact tipped, lifted or slipped' if through else ''}"
+        f"{attributes['robot']} under {attributes['controller']}: {end.message.rstrip('.')}, "
+        f"{end.time:.2f} s{', though a contact tipped, lifted or slipped' if through else ''}"
     )
     click.echo(
-        f"  CoM y error {summary['com_error_rms'] * 1e3:.3f} mm rms, "
-        f"{summary['com_error_peak'] * 1e3:.3f} mm at most"
+        f"  CoM y error {recording.tracking_error * 1e3:.3f} mm rms, "
+        f"{recording.tracking_peak * 1e3:.3f} mm at most"
     )
-    for name, margin in summary["smallest_margin"].items():
+    for name, margin in recording.smallest_margin.items():
         if math.isfinite(margin):
             click.echo(f"  smallest margin of {name}: {margin * 1e3:+.1f} mm")
-    click.echo(
-        f"  torque norm {summary['torque_norm_mean']:.1f} Nm, peak {summary['torque_peak']:.1f} Nm"
-    )
+    click.echo(f"  torque norm {recording.torque_norm:.1f} Nm, peak {recording.torque_peak:.1f} Nm")
     if tip:
         click.echo(
-            f"  first tip at {tip['time']:.2f} s, CoM y {tip['com_y_from_start'] * 1e3:+.1f} mm "
-            f"from the start: {tip['reason']}"
+            f"  first tip at {tip.time:.2f} s, CoM y {recording.tip_travel * 1e3:+.1f} mm "
+            f"from the start: {tip.message}"
         )
     else:
         click.echo("  no contact tipped")
-    if static["statement"]:
-        click.echo(f"  static prediction: {static['statement']}")
-    quasi = summary["quasi_static"]
-    if quasi["share"] > _TOO_FAST:
+    if attributes.get("static_statement"):
+        click.echo(f"  static prediction: {attributes['static_statement']}")
+    if attributes.get("quasi_static_share", 0.0) > _TOO_FAST:
+        excess, share = attributes["quasi_static_excess"], attributes["quasi_static_share"]
         click.echo(
             f"  too fast for statics: in motion the centre of pressure goes up to "
-            f"{quasi['excess'] * 1e3:.1f} mm ({quasi['share'] * 100:.0f} %) farther than the CoM. "
-            f"Statics are right within {_TOO_FAST * 100:.0f} % up to {quasi['frequency']:.2f} Hz"
+            f"{excess * 1e3:.1f} mm ({share * 100:.0f} %) farther than the CoM. Statics are right "
+            f"within {_TOO_FAST * 100:.0f} % up to {attributes['quasi_static_frequency']:.2f} Hz"
         )

@@ -100,7 +100,7 @@ def benchmark(
     fails is a row with its reason. A run that was stopped is resumed by the same command.
     Exit code 1 where a run failed.
     """
-    from copsense.comparison import read_plan, run_benchmark
+    from copsense.comparison import benchmark_summary, read_plan, run_benchmark
     from copsense.comparison.benchmark_run import check_plan, finished_scores
     from copsense.files import check_output
 
@@ -139,7 +139,7 @@ def benchmark(
 
         save_figure(plot_benchmark(table), picture, overwrite=redraw)
     if as_json:
-        echo_json(_summary(plan, table) | {"notes": notes})
+        echo_json(benchmark_summary(table) | {"notes": notes})
     else:
         _print(plan, table)
         echo_written(output, picture)
@@ -218,7 +218,7 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     notes: list[str] = []
     for source, frames in dict.fromkeys(asked):
         if source not in PRESETS or frames:
-            robot = load_robot(source)
+            robot = load_robot(source, frames=frames)
             for frame in frames:
                 robot.frame(frame)
             notes += [f"{robot.name}: {note}" for note in robot.notes]
@@ -304,19 +304,6 @@ def _bar() -> Iterator[Any]:
         total=1.0, desc="benchmark", bar_format=shape, disable=None, leave=False, smoothing=0.05
     ) as bar:
         yield lambda share: bar.update(min(share, 1.0 - bar.n))
-
-
-def _summary(plan: Sequence[Case], table: pd.DataFrame) -> dict[str, Any]:
-    from copsense.comparison import CAVEAT, agreement, rank_controllers
-
-    return {
-        "cases": len(plan),
-        "failed": int(table[table["status"] == "failed"]["key"].nunique()),
-        "scores": table.drop(columns="parameters").to_dict("records"),
-        "ranking": rank_controllers(table).to_dict("records"),
-        "agreement": agreement(table).to_dict("records"),
-        "caveat": CAVEAT,
-    }
 
 
 def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:

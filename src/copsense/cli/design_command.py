@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,8 +14,6 @@ from copsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.design import Design, Score
-
-_SAME = 1e-6  # relative: less is not a gain
 
 
 @click.command(
@@ -103,30 +100,18 @@ def design(
 
         save_figure(plot_design(found), picture, overwrite=force)
     if as_json:
-        echo_json(
-            {
-                "robot": stance.robot.name,
-                "family": family,
-                "objective": objective,
-                "best": asdict(found.score),
-                "at_bound": list(found.at_bound),
-                "baselines": [asdict(s) for s in found.baselines],
-                "alternatives": [asdict(s) for s in found.alternatives],
-                "pareto": [asdict(s) for s in found.pareto],
-                "notes": list(stance.robot.notes),
-            }
-        )
+        echo_json(found.to_dict())
     else:
-        _print(stance.robot.name, found)
+        _print(found)
         if picture is not None:
             click.echo()
             echo_written(picture)
 
 
-def _print(robot: str, found: Design) -> None:
+def _print(found: Design) -> None:
     from copsense.design import NO_LIMIT
 
-    click.echo(f"{robot}: family {found.family}, objective {found.objective}")
+    click.echo(f"{found.robot}: family {found.family}, objective {found.objective}")
     click.echo("criterion         travel [mm]  worst gain  torque norm [N m]  first limit")
     for row in (*found.baselines, found.score):
         click.echo(_line(row))
@@ -134,7 +119,7 @@ def _print(robot: str, found: Design) -> None:
         chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
         click.echo(_line(row) + f"  best of family length: {chosen}")
     chosen = ", ".join(f"{k} = {v:.4g}" for k, v in found.score.parameters.items())
-    click.echo(f"\nbest: {chosen}; {_gained(found)}")
+    click.echo(f"\nbest: {chosen}; {found.verdict}")
     if found.at_bound:
         click.echo(
             f"at a bound of the family: {', '.join(found.at_bound)}; beyond it may be better still"
@@ -154,26 +139,6 @@ def _print(robot: str, found: Design) -> None:
     for row in found.pareto:
         chosen = ", ".join(f"{k} = {v:.3g}" for k, v in row.parameters.items())
         click.echo(_line(row) + f"  {chosen}")
-
-
-def _gained(found: Design) -> str:
-    """What the designed criterion is worth beside the better of the paper's two."""
-    if found.objective == "gain":
-        best = min(found.baselines, key=lambda s: s.worst_gain)
-        change = found.score.worst_gain / best.worst_gain - 1 if best.worst_gain > 0 else 0.0
-        better, what = change < -_SAME, "worst gain"
-    else:
-        best = max(found.baselines, key=lambda s: s.travel)
-        if best.travel == 0:
-            own = found.score.travel * 1e3
-            return f"{own:.1f} mm, where the paper's two are beyond a limit in the middle already"
-        change = found.score.travel / best.travel - 1 if best.travel > 0 else 0.0
-        better, what = change > _SAME, "travel"
-    if not better:
-        return (
-            f"no better than {best.criterion} ({what} {change * 100:+.1f} %): keep {best.criterion}"
-        )
-    return f"{what} {change * 100:+.0f} % over the better of the paper's two"
 
 
 def _line(row: Score) -> str:

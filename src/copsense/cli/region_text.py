@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.limits import Limits
-    from copsense.regions import ComRegion
+    from copsense.regions import ComRegions
     from copsense.stance import Stance
 
 _REACH, _POSTURES = 0.05, 21  # of the CoM's path that is drawn with the regions [m]
@@ -22,7 +22,7 @@ def save_regions(
     picture: str,
     *,
     overwrite: bool,
-) -> Mapping[str, ComRegion]:
+) -> ComRegions:
     """Draw the regions that limits leave, with the soles and the lateral path, and return them."""
     from copsense.path import lateral_sweep
     from copsense.plots import plot_regions, save_figure
@@ -38,20 +38,6 @@ def save_regions(
     assert isinstance(figure, Figure)
     save_figure(figure, picture, overwrite=overwrite)
     return regions
-
-
-def region_data(regions: Mapping[str, ComRegion], stance: Stance) -> dict[str, Any]:
-    """The regions as plain data; ``margin`` is how far the stance's CoM is inside [m]."""
-    return {
-        name: {
-            "polygon": region.polygon,
-            "area": region.area,
-            "gap": region.gap,
-            "bounded": region.bounded,
-            "margin": region.margin(stance.com[:2]),
-        }
-        for name, region in regions.items()
-    }
 
 
 def region_lines(regions: Mapping[str, Any]) -> Iterator[str]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import limits_option
+from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
@@ -74,6 +75,7 @@ def stance_options(command: F) -> F:
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        load_options,
         limits_option,
     ]
     return with_options(options, command)
@@ -89,6 +91,8 @@ def read_stance(
     posture: tuple[str, ...],
     base_yaw: float | None,
     width: float | None,
+    loads: tuple[str, ...] = (),
+    payloads: tuple[str, ...] = (),
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
@@ -104,7 +108,11 @@ def read_stance(
             )
         contact_at = "frame"  # moved by the height, and no farther
     # A preset is passed by name, so that its feet and posture come along.
-    source = robot if robot in PRESETS else load_robot(robot, package_dirs=package_dirs)
+    source = (
+        robot
+        if robot in PRESETS
+        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
+    )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
     named = any(":" in text for text in contacts)
@@ -112,7 +120,7 @@ def read_stance(
     # Which unit a bare number has depends on the joint.
     positions = read_positions(posture, model) if model is not None else {}
     frames = model.frame_names if model is not None else ()
-    return load_stance(
+    stance = load_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
@@ -121,6 +129,7 @@ def read_stance(
         base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
         width=width,
     )
+    return put_loads(stance, loads, payloads)
 
 
 def _read_contacts(
@@ -156,6 +165,11 @@ def _read_contacts(
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
         contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
+
+
+def _possible_frames(texts: tuple[str, ...]) -> list[str]:
+    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
+    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
 
 
 def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:

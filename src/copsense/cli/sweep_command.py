@@ -86,16 +86,17 @@ def sweep(
     path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
         swept = evaluate(path, chosen, within, progress=update)
-    dataset = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
-    failures = dataset.failed_rows
+    swept = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
+    failures = swept.failed_rows
     if output is not None:
-        dataset.save(output, overwrite=force)
-    summary = _summary(dataset, output)
+        swept.save(output, overwrite=force)
+    answer = swept.to_dict()
     if as_json:
-        echo_json(summary | {"notes": list(path.stances[0].robot.notes)})
+        echo_json(answer | {"output": output})
     else:
-        _print(summary)
-    _note_joints(dataset, path.stances[0].robot)
+        _print(answer)
+        echo_written(output)
+    _note_joints(swept, path.stances[0].robot)
     for posture, criterion, reason in failures[:5]:
         click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
     if len(failures) > 5:
@@ -123,43 +124,19 @@ def _read_path(
         return joint_sweep(stance, name, start, stop, count, progress=update)
 
 
-def _summary(dataset: Sweep, output: str | None) -> dict[str, Any]:
-    """What a person wants to know first: over which range every foot stays planted."""
-    coordinate, limits = dataset.coordinate, dataset.limits
-    ranges = dataset.planted_range if limits is None else dataset.free_range
-    criteria = {
-        name: {
-            "planted": ranges[name],
-            "smallest_margin": float(dataset["margin"].sel(criterion=name).min()),
-            "largest_residual": float(dataset["residual"].sel(criterion=name).max()),
-        }
-        for name in dataset.labels("criterion")
-    }
-    return {
-        "robot": dataset.attrs["robot"],
-        "coordinate": coordinate.name,
-        "unit": coordinate.attrs["units"],
-        "postures": coordinate.size,
-        "failed_rows": len(dataset.failed_rows),
-        "output": output,
-        "criteria": criteria,
-        "limits": None if limits is None else repr(limits),
-        "without_sole": dataset.attrs["without_sole"],
-    }
-
-
 def _note_joints(swept: Sweep, robot: Robot) -> None:
     """Say which joints are beyond their limits on the way."""
+    import numpy as np
+
     from copsense.analysis.joint_notes import ROUNDING, distance_text
 
-    units = dict(zip(robot.dof_names, robot.dof_units, strict=True))
-    for name in swept.labels("joint"):
-        excess = swept["joint_limit_excess"].sel(joint=name)
-        count, most = int((excess > ROUNDING).sum()), float(excess.max())
+    every = swept["joint_limit_excess"].values
+    for name, unit, excess in zip(robot.dof_names, robot.dof_units, every.T, strict=True):
+        count, most = int((excess > ROUNDING).sum()), float(np.nanmax(excess, initial=0.0))
         if count:
             click.echo(
                 f"note: {name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up "
-                f"to {distance_text(most, units[name])}",
+                f"to {distance_text(most, unit)}",
                 err=True,
             )
 
@@ -182,7 +159,7 @@ def _print(summary: dict[str, Any]) -> None:
         else:
             low, high = (value * factor for value in row["planted"])
             planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
-        if math.isfinite(row["smallest_margin"]):
+        if row["smallest_margin"] is not None:
             planted += (
                 f"; smallest margin on the way {_rounded(row['smallest_margin'] * 1e3):+.1f} mm"
             )
@@ -193,5 +170,3 @@ def _print(summary: dict[str, Any]) -> None:
             "either: give --sole X0:X1:Y0:Y1.",
             err=True,
         )
-    if summary["output"]:
-        echo_written(summary["output"])

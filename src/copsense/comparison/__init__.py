@@ -15,7 +15,13 @@ from copsense.comparison.benchmark_run import run_benchmark, run_case
 from copsense.comparison.case import Case, make_plan
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
 from copsense.comparison.plan_file import read_plan
-from copsense.comparison.ranking import CAVEAT, agreement, rank_controllers, rank_scores
+from copsense.comparison.ranking import (
+    CAVEAT,
+    agreement,
+    benchmark_summary,
+    rank_controllers,
+    rank_scores,
+)
 from copsense.comparison.score import Score
 from copsense.comparison.score_kinds import SCORES, ScoreKind, shown_unit
 from copsense.comparison.table import load_benchmark
@@ -40,6 +46,7 @@ __all__ = [
     "Sway",
     "Trial",
     "agreement",
+    "benchmark_summary",
     "load_benchmark",
     "make_plan",
     "predict_impulse",

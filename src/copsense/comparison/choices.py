@@ -82,7 +82,9 @@ class RobotChoice:
         Raises:
             CopsenseError: the robot cannot be loaded, or cannot stand in this posture.
         """
-        robot: str | Robot = self.source if self.source in PRESETS else load_robot(self.source)
+        robot: str | Robot = self.source
+        if self.source not in PRESETS:
+            robot = load_robot(self.source, frames=(*self.contacts, *(self.soles or ())))
         contacts: list[str | Contact] | None = list(self.contacts) or None
         if self.soles:
             known = PRESETS[self.source].contacts if self.source in PRESETS else ()

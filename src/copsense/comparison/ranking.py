@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from copsense.comparison.score_kinds import SCORES
+from copsense.json_data import json_data
 
 CAVEAT = (
     "Prediction and controller use the same criterion to share the load: the agreement compares "
@@ -135,6 +137,27 @@ def agreement(table: pd.DataFrame) -> pd.DataFrame:
             )
     columns = ["score", "unit", "prediction", "cases", "mean_error", "largest_error"]
     return pd.DataFrame(rows, columns=[*columns, "correlation", "low", "high"])
+
+
+def benchmark_summary(table: pd.DataFrame) -> dict[str, Any]:
+    """What ``copsense benchmark --json`` prints of a table, as plain data.
+
+    Returns:
+        ``cases`` and how many of them ``failed``, and as lists of rows ``scores``, ``ranking``
+        (`rank_controllers`) and ``agreement``, with its ``caveat``; None for what is not a number.
+    """
+    rows = {
+        "scores": table.drop(columns="parameters"),
+        "ranking": rank_controllers(table),
+        "agreement": agreement(table),
+    }
+    data: dict[str, Any] = {
+        "cases": int(table["key"].nunique()),
+        "failed": int(table[table["status"] == "failed"]["key"].nunique()),
+        **{name: part.to_dict("records") for name, part in rows.items()},
+        "caveat": CAVEAT,
+    }
+    return dict(json_data(data))
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> tuple[float, float, float]:

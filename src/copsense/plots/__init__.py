@@ -22,6 +22,7 @@ from copsense.plots.curve_plots import (
 from copsense.plots.design_plots import plot_design
 from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_regions
 from copsense.plots.map_plots import plot_map
+from copsense.plots.push_plots import plot_pushes
 from copsense.plots.recording_plots import plot_rollout
 from copsense.plots.saving import render_figure, save_figure
 from copsense.plots.sole_plots import plot_soles
@@ -38,6 +39,7 @@ __all__ = [
     "plot_load",
     "plot_map",
     "plot_margin",
+    "plot_pushes",
     "plot_regions",
     "plot_results",
     "plot_rollout",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense.criterion import Criterion
+from copsense.json_data import json_data
 from copsense.limits import Limits
 from copsense.regions.feasible_region import com_region
 from copsense.regions.region import ComRegion
@@ -57,6 +59,24 @@ class ComRegions(Mapping[str, ComRegion]):
             for name, region in self.items()
         )
         return "\n".join(["ComRegions:", *lines])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data of each region, as ``copsense analyse --regions ... --json`` prints it.
+
+        ``margin`` is how far the stance's CoM is inside [m], None for an empty region.
+        """
+        return {
+            name: json_data(
+                {
+                    "polygon": region.polygon,
+                    "area": region.area,
+                    "gap": region.gap,
+                    "bounded": region.bounded,
+                    "margin": self.margins[name],
+                }
+            )
+            for name, region in self.items()
+        }
 
     @property
     def areas(self) -> dict[str, float]:

@@ -32,15 +32,25 @@ class ContactGeometryWarning(UserWarning):
 
 
 def load_robot(
-    source: str | Path | Robot | pin.Model, *, package_dirs: Iterable[str | Path] = ()
+    source: str | Path | Robot | pin.Model,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    frames: Iterable[str] = (),
+    root: str | None = None,
 ) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
-    A `Robot` is returned as it is.
+    Args:
+        source: what to load; a `Robot` is returned as it is.
+        package_dirs: folders that hold the packages of ``package://`` meshes.
+        frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
+            tree that holds them is the robot.
+        root: name of a body of the robot that is meant, where an MJCF holds several.
 
     Raises:
-        UnknownNameError: neither a preset nor a file.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`.
         ModelLoadError: the file cannot be read.
+        InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
     if isinstance(source, Robot):
@@ -55,7 +65,9 @@ def load_robot(
         path.parent == Path()
     ):
         raise UnknownNameError("robot", text, PRESETS, "Or give the path of a URDF or MJCF file.")
-    return Robot.from_description(load_description(source, package_dirs=package_dirs))
+    return Robot.from_description(
+        load_description(source, None, package_dirs, frames=frames, root=root)
+    )
 
 
 def load_stance(
@@ -89,7 +101,7 @@ def load_stance(
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = load_robot(source, package_dirs=package_dirs)
+    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -199,6 +211,13 @@ def likely_feet(robot: Robot) -> tuple[str, ...]:
     """Frames of a model whose names look like feet."""
     words = ("sole", "foot", "toe", "ankle_roll")
     return tuple(n for n in dict.fromkeys(robot.frame_names) if any(w in n.lower() for w in words))
+
+
+def _frames(contacts: object) -> tuple[str, ...]:
+    """Frames named by contacts of any kind; what is none is rejected elsewhere."""
+    given = contacts if isinstance(contacts, Sequence) and not isinstance(contacts, str) else ()
+    frames = [c.frame if isinstance(c, Contact) else c for c in given]
+    return tuple(frame for frame in frames if isinstance(frame, str))
 
 
 def _contact(given: object, known: Mapping[str, Contact]) -> Contact:

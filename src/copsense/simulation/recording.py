@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from html import escape
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.simulation.events import Event
 
@@ -123,10 +124,60 @@ class Recording(LabelledResult):
         margin = self.before_first_tip["margin"].min("time")
         return dict(zip(self.labels("contact"), map(float, margin.values), strict=True))
 
+    @property
+    def torque_norm(self) -> float:
+        """Mean over time of the norm of the torques before the first tip [Nm]."""
+        torque = self.before_first_tip["torque"]
+        return float(((torque**2).sum("joint") ** 0.5).mean())
+
+    @property
+    def torque_peak(self) -> float:
+        """Largest torque of any joint before the first tip [Nm]."""
+        return float(abs(self.before_first_tip["torque"]).max())
+
     def between(self, start: float, stop: float) -> Recording:
         """The rows from one time to another, both included [s]."""
         time = self["time"].values
         return self._rows((time >= start) & (time <= stop))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense balance --json`` prints: plain data, None for what is not a number.
+
+        How it ended, and tracking [m], margins [m] and torques [Nm] before the first tip, beside
+        the static prediction; without one its texts are empty.
+        """
+        attributes, end, tip = self.attrs, self.end, self.tip
+        data: dict[str, Any] = {
+            "robot": attributes.get("robot", ""),
+            "controller": attributes.get("controller", ""),
+            "end": {"kind": end.kind, "reason": end.message, "time": end.time},
+            "com_error_rms": self.tracking_error,
+            "com_error_peak": self.tracking_peak,
+            "smallest_margin": self.smallest_margin,
+            "torque_norm_mean": self.torque_norm,
+            "torque_peak": self.torque_peak,
+            "first_tip": None
+            if tip is None
+            else {
+                "contact": tip.contact,
+                "reason": tip.message,
+                "time": tip.time,
+                "com_y_from_start": self.tip_travel,
+            },
+            "static_prediction": {
+                "excursion": attributes.get("static_excursion"),
+                "contact": attributes.get("static_contact", ""),
+                "how": attributes.get("static_how", ""),
+                "reach": attributes.get("static_reach"),
+                "statement": attributes.get("static_statement", ""),
+            },
+            "quasi_static": {
+                name: attributes.get(f"quasi_static_{name}")
+                for name in ("lever", "excess", "share", "frequency")
+            },
+            "notes": list(self.notes),
+        }
+        return dict(json_data(data))
 
     def to_pandas(self) -> pd.DataFrame:
         """A tidy table: a row per time and contact."""

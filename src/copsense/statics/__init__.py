@@ -21,6 +21,7 @@ from copsense.statics.equilibrium import (
     is_admissible,
     share_load,
     solve_static,
+    with_tie_break,
 )
 from copsense.statics.policy import WrenchPolicy, policy_name, wrench_policy
 
@@ -38,6 +39,7 @@ __all__ = [
     "policy_name",
     "share_load",
     "solve_equilibrium",
+    "with_tie_break",
     "wrench_policy",
 ]
 

@@ -105,6 +105,9 @@ class Kkt:
         _, s, vt = np.linalg.svd(seen)
         rank = int(np.sum(s > _NULL * s[0]))
         self.free = vt[rank:].T
+        # Forces of loops alone may be free: contacts and motors do not feel them.
+        if np.abs(self.free[: len(self.stance.row_names)]).max(initial=0.0) < _NULL:
+            self.free = self.free[:, :0]
         self._pinv = np.linalg.pinv(scaled, rcond=_NULL, hermitian=True)
 
     def solve(self, right: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ def limit_words(limits: Limits) -> str:
         if not isinstance(limits.torsion, str):
             given = f"{limits.torsion:.3g} m"
         words.append(f"torsion {given}")
-    if limits.cop_margin is not None:
+    if isinstance(limits.cop_margin, float):
         inside = f" by {limits.cop_margin * 1e3:g} mm" if limits.cop_margin else ""
         words.append(f"CoP inside the sole{inside}")
     if limits.torque == "model":

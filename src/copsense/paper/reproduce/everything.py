@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import replace
 
 from copsense.errors import InvalidInputError
@@ -65,6 +66,10 @@ def reproduce_paper(
         raise InvalidInputError(f"a reproduction needs {_LEAST} postures or more, got {postures}.")
     if not limits.any:
         raise InvalidInputError("the section on limits needs one. Switch one on.")
+    if any(isinstance(limit, Mapping) for limit in limits.to_dict().values()):
+        raise InvalidInputError(
+            "the report tells limits that are alike at every contact and joint. Give numbers."
+        )
     clock, stance = Clock(progress), load_stance(ROBOT)
     for criterion in paper_criteria():
         solve_equilibrium(stance, criterion, limits)  # rejects limits that forbid it, at once
@@ -116,7 +121,8 @@ def reproduce_paper(
 
 
 def _sway(stance: Stance, limits: Limits, frequency: float, clock: Clock) -> Sway:
-    within = replace(limits, cop_margin=max(limits.cop_margin or 0.0, _ROLLING))
+    asked = limits.cop_margin if isinstance(limits.cop_margin, float) else 0.0
+    within = replace(limits, cop_margin=max(asked, _ROLLING))
     started, progress = time.perf_counter(), clock.progress
     wrench, torque = paper_criteria()
     found = sway_in_simulation(
