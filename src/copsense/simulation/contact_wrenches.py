@@ -75,7 +75,8 @@ class ContactWrenches:
     def _by_link(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         # The engine's own sums: moment, then force, on each link about the robot's CoM.
         self._mujoco.mj_rnePostConstraint(self._model, self._data)
-        found, (cx, cy, cz) = [], self._com.tolist()
+        found: list[float] = []
+        cx, cy, cz = self._com.tolist()
         # Written out: for so few numbers NumPy's own product takes four times as long.
         for outer, (px, py, pz) in zip(
             self._outer.take(self._links, axis=0).tolist(), positions.tolist(), strict=True
