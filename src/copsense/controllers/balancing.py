@@ -141,7 +141,7 @@ class BalancingController:
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve a symmetric system; the least solution where contacts are redundant."""
-    factor, info = lapack.dpotrf(matrix, lower=1)
+    factor, solved, info = lapack.dposv(matrix, right, lower=1)
     if info == 0 and well_determined(matrix, factor, _RANK):
-        return np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
+        return np.asarray(solved)
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])

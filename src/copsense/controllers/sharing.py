@@ -65,9 +65,9 @@ class ShareByCriterion:
             # The cost along Z from these forces: curvature, and minus the slope.
             cost, pull = level.over_forces(problem)
             H, g = Z.T.dot(cost.dot(Z)), Z.T.dot(pull - cost.dot(forces))
-            cholesky, info = lapack.dpotrf(H)
+            cholesky, y, info = lapack.dposv(H, g)
             if info == 0 and well_determined(H, cholesky, _NULL):
-                return np.asarray(forces + Z.dot(lapack.dpotrs(cholesky, g)[0]))
+                return np.asarray(forces + Z.dot(y))
             values, vectors = np.linalg.eigh(H)
             seen = values > _NULL * max(float(values[-1]), 1e-300)
             on = vectors[:, seen]
