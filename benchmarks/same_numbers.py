@@ -31,10 +31,10 @@ LIMITS = "--limits friction=0.33,torque=model"
 # Name -> arguments. OUT stands for the folder that the command may write into.
 COMMANDS = {
     "robots": "robots --json",
-    "four-bar-torque": "four-bar --xi 1.5 --json",
-    "four-bar-wrench": "four-bar --xi 1.4 --criterion minimum-wrench --json",
-    "four-bar-weighted": "four-bar --criterion weighted-torque --hip-weight 2 --xi 1.45 --json",
-    "four-bar-tangential": "four-bar --criterion minimum-tangential --xi 1.5 --json",
+    "four-bar-torque": "four-bar --xi 1.5rad --json",
+    "four-bar-wrench": "four-bar --xi 1.4rad --criterion minimum-wrench --json",
+    "four-bar-weighted": "four-bar --criterion weighted-torque --hip-weight 2 --xi 1.45rad --json",
+    "four-bar-tangential": "four-bar --criterion minimum-tangential --xi 1.5rad --json",
     "analyse-icub": "analyse icub --com-y 0.03 --along l_hip_roll --check --json",
     "analyse-icub-limits": f"analyse icub --com-y 0.02 {LIMITS} --json",
     "analyse-icub-regions": f"analyse icub {LIMITS} --regions OUT/regions.png --json",
@@ -109,7 +109,7 @@ def record(checkout: Path, folder: Path) -> None:
         if (out / "exit").exists():
             continue
         out.mkdir(exist_ok=True)
-        words = shlex.split(arguments.replace("OUT", str(out.resolve())))
+        words = shlex.split(_typed(arguments, checkout).replace("OUT", str(out.resolve())))
         began = time.perf_counter()
         done = subprocess.run(
             [sys.executable, "-c", start, *words],
@@ -122,6 +122,12 @@ def record(checkout: Path, folder: Path) -> None:
         (out / "errors.txt").write_text(done.stderr)
         (out / "exit").write_text(str(done.returncode))
         print(f"{name}: exit {done.returncode}, {time.perf_counter() - began:.0f} s", flush=True)
+
+
+def _typed(arguments: str, checkout: Path) -> str:
+    """The arguments as a checkout reads them: once ``--xi`` was a bare number of radians."""
+    command = (checkout / "src/copsense/cli/four_bar_command.py").read_text("utf-8")
+    return arguments if "ANGLE" in command else re.sub(r"(--xi \S+?)rad", r"\1", arguments)
 
 
 def compare(old: Path, new: Path) -> int:

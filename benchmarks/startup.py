@@ -24,7 +24,9 @@ STARTS = {
 def cpu_time(arguments: list[str]) -> float:
     """User and system time of one process [s]."""
     before = os.times()
-    subprocess.run([sys.executable, *arguments], check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(done.stderr)
     after = os.times()
     return (after.children_user - before.children_user) + (
         after.children_system - before.children_system

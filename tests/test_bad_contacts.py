@@ -43,7 +43,7 @@ def test_no_contact_lists_the_frames(icub):
         Stance(icub.robot, icub.q, ())
 
 
-def test_contacts_of_one_name_are_refused_and_may_be_renamed(icub):
+def test_contacts_of_one_name_are_rejected_and_may_be_renamed(icub):
     with pytest.raises(InvalidInputError, match=r"share a name: l_sole, l_sole.*name=") as caught:
         icub.with_contacts([Contact("l_sole"), Contact("l_sole")])
     assert "r_sole" not in str(caught.value)

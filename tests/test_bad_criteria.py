@@ -1,4 +1,4 @@
-"""Criteria, weights and laws that determine nothing, or nonsense, say so."""
+"""Criteria, weights and policies that determine nothing, or nonsense, say so."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_scales_and_factors_are_positive(scale):
         copsense.mixed((copsense.minimum_torque(), scale))
 
 
-def test_a_criterion_without_terms_is_refused():
+def test_a_criterion_without_terms_is_rejected():
     with pytest.raises(InvalidInputError, match="no term to minimise"):
         copsense.mixed()
 
@@ -60,7 +60,7 @@ def test_a_criterion_without_terms_is_refused():
         ({"l_knee": -1.0}, "positive semidefinite"),
     ],
 )
-def test_torque_weights_that_cannot_be_minimised_are_refused(icub, weights, said):
+def test_torque_weights_that_cannot_be_minimised_are_rejected(icub, weights, said):
     with pytest.raises(InvalidInputError, match="'weighted-torque': torque weights") as caught:
         copsense.solve_equilibrium(icub, weighted(weights))
     assert said in str(caught.value)
@@ -78,7 +78,7 @@ def test_torque_weights_that_cannot_be_minimised_are_refused(icub, weights, said
         ({"l_sole": np.ones(3)}, "six numbers"),
     ],
 )
-def test_wrench_weights_that_cannot_be_minimised_are_refused(icub, weights, said):
+def test_wrench_weights_that_cannot_be_minimised_are_rejected(icub, weights, said):
     with pytest.raises(InvalidInputError, match="'mine'") as caught:
         copsense.solve_equilibrium(icub, on_wrenches(weights))
     assert said in str(caught.value)
@@ -145,7 +145,7 @@ def test_a_tie_break_that_leaves_the_same_freedom_is_not_enough(one_foot_twice):
             copsense.solve_equilibrium(one_foot_twice, criterion)
 
 
-def test_a_tie_break_that_follows_the_inertia_is_refused(one_foot_twice):
+def test_a_tie_break_that_follows_the_inertia_is_rejected(one_foot_twice):
     criterion = copsense.minimum_torque(tie_break=weighted("inverse inertia"))
     with pytest.raises(InvalidInputError, match="cannot be a tie-break"):
         copsense.solve_equilibrium(one_foot_twice, criterion)
@@ -208,7 +208,7 @@ def failing(q):
 
 
 @pytest.mark.parametrize(
-    ("law", "said"),
+    ("policy", "said"),
     [
         (zero, "do not balance gravity: 324 N"),
         (not_numbers, "not an array of numbers"),
@@ -219,19 +219,19 @@ def failing(q):
         (failing, "raised KeyError: 'gain'. Fix it"),
     ],
 )
-def test_a_law_that_answers_wrongly_is_named_with_what_was_wrong(icub, law, said):
-    with pytest.raises(InvalidInputError, match=law.__name__) as caught:
-        copsense.solve_equilibrium(icub, law)
+def test_a_policy_that_answers_wrongly_is_named_with_what_was_wrong(icub, policy, said):
+    with pytest.raises(InvalidInputError, match=policy.__name__) as caught:
+        copsense.solve_equilibrium(icub, policy)
     assert said in str(caught.value)
 
 
-def test_a_law_s_own_error_stays_in_sight(icub):
+def test_a_policy_s_own_error_stays_in_sight(icub):
     with pytest.raises(InvalidInputError) as caught:
         copsense.cop_sensitivity(icub, failing)
     assert isinstance(caught.value.__cause__, KeyError)
 
 
-def test_a_law_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path):
+def test_a_policy_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path):
     dataset = copsense.sweep(lateral_path, [failing, copsense.minimum_torque()])
     failed = dataset.failed_rows
     assert {name for _, name, _ in failed} == {"failing"}
@@ -241,15 +241,15 @@ def test_a_law_that_fails_is_a_row_beside_a_criterion_that_does_not(lateral_path
 
 @pytest.mark.parametrize("count", [1, 3, 24])
 def test_torques_of_the_wrong_number_say_how_many_joints_there_are(icub, count):
-    law = copsense.statics.wrench_policy(lambda q: np.zeros(count), icub)
+    policy = copsense.statics.wrench_policy(lambda q: np.zeros(count), icub)
     with pytest.raises(InvalidInputError, match=r"the torques returned .*\(23,\)"):
-        copsense.solve_equilibrium(icub, law)
+        copsense.solve_equilibrium(icub, policy)
 
 
 def test_torques_do_not_determine_redundant_contacts(one_foot_twice):
-    law = copsense.statics.wrench_policy(lambda q: np.zeros(23), one_foot_twice)
+    policy = copsense.statics.wrench_policy(lambda q: np.zeros(23), one_foot_twice)
     with pytest.raises(UndeterminedWrenchError, match="no torque can feel"):
-        copsense.solve_equilibrium(one_foot_twice, law)
+        copsense.solve_equilibrium(one_foot_twice, policy)
 
 
 def test_criteria_of_a_sweep_have_distinct_names(lateral_path):

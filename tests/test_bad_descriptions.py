@@ -44,7 +44,7 @@ def test_a_file_that_is_no_xml_says_so(load, content, tmp_path):
         load(path)
 
 
-def test_xml_of_another_kind_is_refused_with_the_kinds_there_are():
+def test_xml_of_another_kind_is_rejected_with_the_kinds_there_are():
     with pytest.raises(ModelLoadError, match=r"starts with <html>, URDF with <robot>"):
         Robot.from_urdf("<html/>")
     with pytest.raises(ModelLoadError, match=r"URDF with <robot> and MJCF with <mujoco>"):
@@ -178,14 +178,14 @@ def test_an_unknown_robot_lists_the_known_ones_and_the_nearest():
         copsense.load_robot("iccub")
 
 
-def test_a_model_without_floating_base_is_refused():
+def test_a_model_without_floating_base_is_rejected():
     with pytest.raises(InvalidInputError, match=r"no floating base .*JointModelFreeFlyer"):
         Robot.from_model(pin.buildSampleModelManipulator())
     with pytest.raises(InvalidInputError, match="first joint is none"):
         Robot.from_model(pin.Model())
 
 
-def test_a_robot_without_mass_is_refused():
+def test_a_robot_without_mass_is_rejected():
     weightless = urdf().replace('mass value="1"', 'mass value="0"')
     with pytest.raises(InvalidInputError, match=r"total 0 kg.*positive masses"):
         Robot.from_urdf(weightless.replace('mass value="2"', 'mass value="0"'))
@@ -199,7 +199,7 @@ def test_a_model_with_a_senseless_mass_names_the_joint_that_carries_it(mass):
         Robot.from_model(model)
 
 
-def test_a_model_with_nan_geometry_or_without_gravity_is_refused():
+def test_a_model_with_nan_geometry_or_without_gravity_is_rejected():
     model = pin.buildSampleModelHumanoidRandom()
     model.inertias[3].lever = np.array([np.nan, 0, 0])
     with pytest.raises(InvalidInputError, match=f"not finite at {model.names[3]}"):
@@ -236,6 +236,6 @@ def test_a_planar_base_takes_no_orientation():
 
 @pytest.mark.parametrize("name", ["leg_length", "rod_length", "leg_mass", "body_mass"])
 @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
-def test_a_four_bar_refuses_senseless_sizes(name, value):
+def test_a_four_bar_rejects_senseless_sizes(name, value):
     with pytest.raises(InvalidInputError, match=name.split("_")[0]):
         copsense.robots.four_bar_robot(**{name: value})

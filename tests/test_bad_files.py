@@ -47,11 +47,11 @@ def test_a_path_that_cannot_be_written_says_why(dataset, name, error, said, tmp_
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file.txt", "folder.nc"]
 
 
-def test_a_folder_that_refuses_files_says_so_before_the_work(monkeypatch, tmp_path):
-    def refuse(*args, **kwargs):
+def test_a_folder_that_rejects_files_says_so_before_the_work(monkeypatch, tmp_path):
+    def reject(*args, **kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    monkeypatch.setattr("tempfile.mkstemp", reject)
     with pytest.raises(OutputError, match=r"Permission denied\. Choose another path"):
         check_output(tmp_path / "results.nc", suffixes=(".nc",), overwrite=False)
 

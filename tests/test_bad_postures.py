@@ -28,7 +28,7 @@ def test_a_configuration_of_the_wrong_size_says_what_it_holds(icub, size):
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.5, 2.0])
-def test_an_unnormalised_quaternion_is_not_mended_in_silence(icub, scale):
+def test_an_unnormalised_quaternion_is_not_fixed_in_silence(icub, scale):
     with pytest.raises(InvalidInputError, match=r"unit length.*x, y, z, w"):
         icub.at(changed(icub.q, slice(3, 7), scale * icub.q[3:7]))
 

@@ -19,24 +19,24 @@ def sensitivity(icub):
 
 
 def on_the_left_foot(stance):
-    """A law under which the right foot carries nothing."""
+    """A policy under which the right foot carries nothing."""
 
-    def law(q):
+    def policy(q):
         here = stance.at(q)
         wrenches = np.zeros((2, 6))
         wrenches[0] = np.linalg.solve(here.jacobian[:6, :6].T, here.gravity[:6])
         return wrenches
 
-    return law
+    return policy
 
 
 def test_an_unloaded_contact_has_no_centre_of_pressure(icub):
-    law = on_the_left_foot(icub)
-    equilibrium = copsense.solve_equilibrium(icub, law)
+    policy = on_the_left_foot(icub)
+    equilibrium = copsense.solve_equilibrium(icub, policy)
     assert equilibrium.unloaded == ("r_sole",)
     for ask in (
         lambda: copsense.cop.contact_cops(equilibrium),
-        lambda: copsense.cop_sensitivity(icub, law),
+        lambda: copsense.cop_sensitivity(icub, policy),
     ):
         with pytest.raises(UnloadedContactError, match=r"on r_sole.*remove the contact") as caught:
             ask()
@@ -76,7 +76,7 @@ def test_a_com_has_no_projection_on_a_wall(icub):
         copsense.cop.com_projection(icub, copsense.Plane(normal=(1, 0, 0)))
 
 
-def test_a_tangent_that_moves_a_contact_is_refused_with_its_projection(icub, sensitivity):
+def test_a_tangent_that_moves_a_contact_is_rejected_with_its_projection(icub, sensitivity):
     with pytest.raises(InvalidInputError, match=r"moves a contact\. Project it"):
         sensitivity.along(np.ones(29))
     Z = icub.admissible_motions
@@ -183,6 +183,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
         errors.UndeterminedWrenchError("open", ("l_sole fz",)),
         errors.InfeasibleError(3.0, ("l_sole: normal force",)),
         errors.UnsolvedError(1e-3),
+        errors.UnbalancedError("rods", {"forearm": 0.8}),
         *(
             e("said")
             for e in family
@@ -194,6 +195,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
                 errors.UndeterminedWrenchError,
                 errors.InfeasibleError,
                 errors.UnsolvedError,
+                errors.UnbalancedError,
             }
         ),
     ]

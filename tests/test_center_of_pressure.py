@@ -92,3 +92,16 @@ def test_a_contact_without_load_has_no_cop(lateral_path):
     assert bare.unloaded == ("l_sole",)
     with pytest.raises(copsense.CopsenseError, match="l_sole"):
         copsense.cop.contact_cops(bare)
+
+
+def test_the_support_polygon_is_the_hull_of_soles_and_points_on_level_ground(stance_of, icub):
+    from copsense.cop import support_polygon
+
+    points = support_polygon(stance_of("solo12"))
+    feet = np.array([place.translation[:2] for place in stance_of("solo12").placements])
+    assert sorted(map(tuple, points.vertices.round(12))) == sorted(map(tuple, feet.round(12)))
+    hull = support_polygon(icub)
+    for contact, place in zip(icub.contacts, icub.placements, strict=True):
+        corners = np.pad(contact.sole.vertices, ((0, 0), (0, 1))) @ place.rotation.T
+        assert (hull.margins((corners + place.translation)[:, :2]) > -1e-9).all()
+    assert support_polygon(stance_of("four_bar")) is None

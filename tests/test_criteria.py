@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from support.commands import copsense as command
 from support.grounds import off_centre
 from support.loads import CRITERIA, criteria
 
 import copsense
+from copsense.criterion import CRITERIA as NAMED
 
 WRENCH, TORQUE = copsense.minimum_wrench(1.0), copsense.minimum_torque()
 
@@ -139,3 +141,9 @@ def test_criteria_by_name_are_the_functions(limited):
         named = copsense.criterion.criterion_named(name, 0.4)
         assert named.name == name
         assert same_wrenches(limited, named, criterion)
+
+
+def test_the_command_offers_every_criterion_that_has_a_name():
+    told = " ".join(command("analyse", "--help").out.split())
+    for name in NAMED:
+        assert name in told.replace("- ", "-"), name

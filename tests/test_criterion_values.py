@@ -15,7 +15,7 @@ SIX = np.array([1.0, 1.0, 1.0, 4.0, 4.0, 4.0])
 
 
 def every_kind():
-    """A criterion of each kind, made anew at each call."""
+    """A criterion of each kind, made again at each call."""
     wrench, torque = copsense.minimum_wrench(0.3), copsense.minimum_torque()
     matrix = np.diag(np.arange(1.0, 24.0))
     return [

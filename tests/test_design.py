@@ -209,7 +209,7 @@ def test_progress_counts_the_grid(icub_path):
     assert seen == [1, 1, 1]
 
 
-def test_what_a_design_refuses(icub_path, icub):
+def test_what_a_design_rejects(icub_path, icub):
     family = families(icub)["length"]
     with pytest.raises(InvalidInputError, match="grid needs 2"):
         design_criterion(icub_path, COP_ONLY, family, grid=1)

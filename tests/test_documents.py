@@ -1,5 +1,6 @@
 """Code shown is code run: the examples, the README's and the documentation's snippets."""
 
+import ast
 import pkgutil
 import re
 import runpy
@@ -18,6 +19,16 @@ FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 def blocks(page: Path, language: str) -> list[str]:
     return [code for name, code in FENCE.findall(page.read_text("utf-8")) if name == language]
+
+
+def test_every_class_says_what_it_is():
+    bare = [
+        f"{path.name}: {node.name}"
+        for path in (ROOT / "src").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.ClassDef) and not ast.get_docstring(node)
+    ]
+    assert not bare
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

@@ -207,7 +207,7 @@ def test_limit_out_of_reach_is_none(rubbing):
 
 
 @pytest.mark.parametrize("direction", [0, 2])
-def test_other_directions_are_refused(rubbing, direction):
+def test_other_directions_are_rejected(rubbing, direction):
     with pytest.raises(InvalidInputError, match=r"\+1 or -1"):
         limit_travel(rubbing, TORQUE, COP_ONLY, direction)
 
@@ -237,7 +237,7 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
     ("options", "says"),
     [({"reach": np.nan}, "reach"), ({"reach": 0.0}, "reach"), ({"samples": 0}, "1 sample or more")],
 )
-def test_a_search_of_nothing_is_refused(icub, options, says):
+def test_a_search_of_nothing_is_rejected(icub, options, says):
     for search in (limit_travel, copsense.scan.next_active_set_change):
         with pytest.raises(InvalidInputError, match=says):
             search(icub, copsense.minimum_torque(), Limits(), **options)

@@ -78,7 +78,7 @@ def test_a_file_reads_the_same(stance, tmp_path):
 
 
 @pytest.mark.parametrize("joint", [pin.JointModelSphericalZYX, pin.JointModelUniversal])
-def test_a_joint_whose_axes_turn_with_it_is_refused(joint):
+def test_a_joint_whose_axes_turn_with_it_is_rejected(joint):
     model = pin.Model()
     base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
     model.appendBodyToJoint(base, pin.Inertia.Random(), pin.SE3.Identity())

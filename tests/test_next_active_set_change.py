@@ -162,7 +162,7 @@ def test_without_limits_nothing_changes(icub):
     assert found.next_active_set_change(-tangent) is None
 
 
-def test_bad_questions_are_refused(icub):
+def test_bad_questions_are_rejected(icub):
     with pytest.raises(InvalidInputError, match=r"\+1 or -1"):
         copsense.scan.next_active_set_change(icub, CRITERIA[0], LIMITS, 0)
     with pytest.raises(InvalidInputError, match="no limit is switched on"):

@@ -112,7 +112,7 @@ def test_path_through_configurations_keeps_them_and_has_admissible_tangents(icub
         assert np.abs(tangent / spacing - exact).max() < 0.05 * np.abs(exact).max()
 
 
-def test_path_through_refuses_a_moved_contact_and_projects_on_request(icub, lateral_path):
+def test_path_through_rejects_a_moved_contact_and_projects_on_request(icub, lateral_path):
     moved = [q + 1e-4 * (np.arange(30) == 9) for q in (s.q for s in lateral_path.stances[:3])]
     with pytest.raises(copsense.CopsenseError, match=r"configuration 0.*project=True"):
         copsense.path_through(icub, moved)

@@ -163,7 +163,7 @@ def test_a_contact_that_would_have_to_pull_is_named(icub):
     assert not swept["pulling"].sel(posture=0, criterion="minimum-torque").any()
 
 
-def test_a_law_is_named_by_its_function_and_progress_is_told(stance_of):
+def test_a_policy_is_named_by_its_function_and_progress_is_told(stance_of):
     path = copsense.lateral_sweep(stance_of("four_bar"), -0.05, 0.05, 3)
 
     def my_controller(q):

@@ -26,6 +26,7 @@ from jaxtyping import Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property
+from copsense.content import ShortRepr, freeze
 from copsense.drives import Loop
 from copsense.errors import InvalidInputError
 from copsense.rigid_body import Attachment
@@ -52,8 +53,8 @@ class _Joined:
         return 6 if self.weld else 3
 
 
-@dataclass(frozen=True, eq=False)
-class Closures:
+@dataclass(frozen=True, eq=False, repr=False)
+class Closures(ShortRepr):
     """The loops and couplings of a robot at a configuration.
 
     Attributes:
@@ -63,6 +64,10 @@ class Closures:
 
     robot: Robot
     q: Float[np.ndarray, " nq"]
+
+    def __post_init__(self) -> None:
+        """Own the configuration."""
+        freeze(self, "q")
 
     @cached_property
     def _ends(self) -> tuple[tuple[pin.SE3, ...], Float[np.ndarray, "e 6 nv"]]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
 from copsense.arrays import owned
+
+_LONG = 200  # characters of a part's own representation that are too many to be a part
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -36,6 +39,15 @@ class FrozenMapping(Mapping[Key, Value]):
     def __repr__(self) -> str:
         """As a dictionary's."""
         return repr(self._items)
+
+
+class ShortRepr:
+    """A dataclass that reads in a few lines, whatever the size of its arrays."""
+
+    def __repr__(self) -> str:
+        """Its fields, arrays of more than a few numbers by their shape."""
+        shown = (f"{f.name}={show(getattr(self, f.name))}" for f in fields(self) if f.repr)  # type: ignore[arg-type]
+        return f"{type(self).__name__}({', '.join(shown)})"
 
 
 class ByContent:
@@ -83,6 +95,23 @@ def own(value: Any) -> Any:
     return array if array.ndim else float(array)
 
 
+def freeze(value: object, *names: str) -> None:
+    """Make fields of a frozen dataclass its own, while it is being made.
+
+    Arrays, alone or in a tuple, become read-only copies, mappings `FrozenMapping`; the rest stays
+    as it is.
+    """
+    for name in names:
+        found = getattr(value, name)
+        if isinstance(found, np.ndarray):
+            found = owned(found)
+        elif isinstance(found, Mapping) and not isinstance(found, FrozenMapping):
+            found = FrozenMapping(found)
+        elif isinstance(found, tuple):
+            found = tuple(owned(each) if isinstance(each, np.ndarray) else each for each in found)
+        object.__setattr__(value, name, found)
+
+
 def _key(value: object) -> object:
     """What is compared and hashed of a field."""
     if isinstance(value, np.ndarray):
@@ -106,11 +135,17 @@ def plain(value: Any) -> Any:
 def show(value: object) -> str:
     """A field in a few words."""
     if isinstance(value, np.ndarray):
-        if value.size > 12:
+        if value.size > 12 or value.dtype.kind not in "biuf":
             return f"<{' x '.join(map(str, value.shape))} numbers>"
         return "[" + ", ".join(f"{x:g}" for x in value.ravel()) + "]"
+    if isinstance(value, tuple | list):
+        more = f", ... {len(value)} in all" if len(value) > 3 else ""
+        return "(" + ", ".join(map(show, value[:3])) + more + ")"
     if isinstance(value, Mapping):
         shown = [f"{name!r}: {show(each)}" for name, each in list(value.items())[:3]]
         more = f", ... {len(value)} in all" if len(value) > 3 else ""
         return "{" + ", ".join(shown) + more + "}"
-    return f"{value:g}" if isinstance(value, float) else repr(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    text = repr(value)
+    return text if len(text) <= _LONG else f"<{type(value).__name__}>"

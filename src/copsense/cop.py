@@ -14,6 +14,8 @@ from copsense.rigid_body import link_momentum_rate, momentum_rate
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
+_LEVEL = 1e-6  # m, or 1 - cosine: how far contacts may be from one horizontal plane
+
 
 def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
     """Centre of pressure of each contact in its own frame [m] ([Romano2016] Eq. (10)).
@@ -69,6 +71,27 @@ def total_center_of_pressure(
 ) -> Float[np.ndarray, " 3"]:
     """Centre of pressure of the whole robot on a plane, in the world [m]."""
     return center_of_pressure(*_resultant(equilibrium.stance, equilibrium.world_wrenches), plane)
+
+
+def support_polygon(stance: Stance) -> Polygon | None:
+    """The hull of every sole and point contact on level ground, world x and y [m].
+
+    None where the contacts do not lie in one horizontal plane, or one of them has no sole: there
+    the centre of pressure of the whole robot is not confined to such a polygon.
+    """
+    corners = []
+    for contact, place in zip(stance.contacts, stance.placements, strict=True):
+        if contact.sole is None and contact.kind != "point":
+            return None
+        flat = np.zeros((1, 2)) if contact.sole is None else contact.sole.vertices
+        local = np.column_stack([flat, np.zeros(len(flat))])
+        corners.append(place.translation + local @ place.rotation.T)
+        if abs(place.rotation[2, 2] - 1.0) > _LEVEL:
+            return None
+    points = np.concatenate(corners)
+    if np.ptp(points[:, 2]) > _LEVEL:
+        return None
+    return Polygon.hull(points[:, :2])
 
 
 def com_projection(stance: Stance, plane: Plane | None = None) -> Float[np.ndarray, " 3"]:

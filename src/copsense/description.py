@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from copsense.xml_numbers import wrong_number
 
 Language = Literal["urdf", "mjcf"]
 
+_DRAKE = 'xmlns:drake="http://drake.mit.edu"'
 _ROOTS: dict[Language, str] = {"urdf": "robot", "mjcf": "mujoco"}
 # Attributes of an MJCF's bodies, inertials and joints that hold numbers; the parser reads a word as
 # whatever comes next in memory or as zero.
@@ -91,6 +93,7 @@ def load_description(
     if path is not None and not is_file(path):
         what = f"{path} is a folder" if is_folder(path) else f"no file at {str(source)[:300]!r}"
         raise ModelLoadError(f"{what}. Give the path of a {kind} file, or its text.")
+    check_package_dirs(package_dirs)
     name = str(path or "the text given")
     text, document = _parse(source if path is None else path, name, kind)
     spaced = without_namespace(document)
@@ -119,6 +122,20 @@ def load_description(
     return Description(text, found, tuple(map(str, package_dirs)), path, notes, tuple(frames), root)
 
 
+def check_package_dirs(folders: Iterable[str | Path]) -> None:
+    """Reject a folder for meshes that is not there.
+
+    Raises:
+        ModelLoadError: there is no such folder.
+    """
+    for folder in folders:
+        if not is_folder(Path(folder)):
+            raise ModelLoadError(
+                f"there is no folder {str(folder)!r} to look meshes up in. Give folders that are "
+                "there as package_dirs (--package-dir)."
+            )
+
+
 def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
     """The text of a file, or a text given, and its XML; in UTF-8 or the encoding it declares.
 
@@ -142,6 +159,11 @@ def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
     except (LookupError, ValueError, ET.ParseError) as error:
         if "unbound prefix" in str(error) and "<xacro:" in text:
             raise _unexpanded(name, ("<xacro:...>",)) from None
+        if "unbound prefix" in str(error) and _DRAKE not in text and "<drake:" in text:
+            # Drake's elements, of a prefix that its own parser does not ask to be declared.
+            declared = re.sub(r"<robot(?=\s)", f"<robot {_DRAKE}", text, count=1)
+            if declared != text:
+                return _parse(declared, name, kind)
         raise ModelLoadError(
             f"{name} is not XML in UTF-8 or the encoding that it declares: {error}. Give a {kind} "
             "file that is whole."
@@ -157,8 +179,6 @@ def _unexpanded(name: str, left: tuple[str, ...]) -> ModelLoadError:
 
 
 def _mjcf_faults(root: ET.Element) -> Iterator[str]:
-    if root.find("worldbody/body") is None and root.find(".//include") is None:
-        yield "its <worldbody> has no <body>"
     for body in root.iterfind("worldbody//body"):
         where = f"body {body.get('name', '')!r}"
         for element in [body, *body.findall("inertial"), *body.findall("joint")]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import ShortRepr, freeze
 from copsense.criterion import (
     Criterion,
     minimum_torque,
@@ -36,8 +38,8 @@ _SAME = 1e-6  # relative: less is not a gain
 _BAD = 1e3  # objective of a criterion that fails on the path
 
 
-@dataclass(frozen=True, eq=False)
-class Family:
+@dataclass(frozen=True, eq=False, repr=False)
+class Family(ShortRepr):
     """Criteria with a few positive parameters, searched on a logarithmic scale.
 
     Attributes:
@@ -53,8 +55,8 @@ class Family:
     build: Callable[[Sequence[float]], Criterion]
 
 
-@dataclass(frozen=True)
-class Score:
+@dataclass(frozen=True, repr=False)
+class Score(ShortRepr):
     """How a criterion does along a path.
 
     Attributes:
@@ -75,9 +77,13 @@ class Score:
     torque_norm: float
     range: float
 
+    def __post_init__(self) -> None:
+        """Own the parameters."""
+        freeze(self, "parameters")
 
-@dataclass(frozen=True, eq=False)
-class Design:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Design(ShortRepr):
     """A designed criterion beside the paper's two.
 
     Attributes:
@@ -172,10 +178,14 @@ def design_criterion(
     """
     if objective not in ("travel", "gain"):
         raise UnknownNameError("objective", objective, ("travel", "gain"))
-    if len(path) < 5 or path.failures:
+    if len(path) < 5:
         raise InvalidInputError(
-            f"a design needs a path of 5 postures or more without failures; this one has "
-            f"{len(path)} and {len(path.failures)}. Sweep less far."
+            f"a design needs a path of 5 postures or more, this one has {len(path)}. Give more."
+        )
+    if path.failures:
+        raise InvalidInputError(
+            f"{len(path.failures)} of the path's {len(path)} postures were not reached, and a "
+            "design needs all of them. Sweep less far."
         )
     if grid < 2:
         raise InvalidInputError(f"the grid needs 2 values a parameter or more, got {grid}.")
@@ -336,11 +346,29 @@ def score(
     )
 
 
+def _of_length(values: Sequence[float]) -> Criterion:
+    return minimum_wrench(values[0], name="designed-wrench")
+
+
+def _of_mix(values: Sequence[float]) -> Criterion:
+    length, share = values
+    return mixed((minimum_torque(), 1.0), (minimum_wrench(length), share), name="designed-mix")
+
+
+def _of_joints(
+    joints: tuple[str, ...], groups: tuple[tuple[str, ...], ...], values: Sequence[float]
+) -> Criterion:
+    weights = dict.fromkeys(joints, 1.0)
+    for names, value in zip(groups, values, strict=True):
+        weights |= dict.fromkeys(names, value)
+    return weighted_torque(weights, name="designed-torque")
+
+
 LENGTHS = Family(
     "length",
     ("characteristic_length",),
     ((0.01, 3.0),),
-    lambda values: minimum_wrench(values[0], name="designed-wrench"),
+    _of_length,
 )
 
 
@@ -354,23 +382,18 @@ def families(stance: Stance) -> dict[str, Family]:
     groups = joint_groups(stance)
     free = tuple(groups)[:-1]
 
-    def joints(values: Sequence[float]) -> Criterion:
-        weights = dict.fromkeys(stance.robot.torque_names, 1.0)
-        for name, value in zip(free, values, strict=True):
-            weights |= dict.fromkeys(groups[name], value)
-        return weighted_torque(weights, name="designed-torque")
-
-    def mix(values: Sequence[float]) -> Criterion:
-        length, share = values
-        return mixed((minimum_torque(), 1.0), (minimum_wrench(length), share), name="designed-mix")
-
     found = [
         LENGTHS,
-        Family("mix", ("characteristic_length", "wrench_share"), ((0.01, 3.0), (1e-4, 1.0)), mix),
+        Family(
+            "mix", ("characteristic_length", "wrench_share"), ((0.01, 3.0), (1e-4, 1.0)), _of_mix
+        ),
     ]
     if free:
         bounds = ((1e-2, 1e2),) * len(free)
-        found.append(Family("joints", tuple(f"{g}_weight" for g in free), bounds, joints))
+        weighed = partial(
+            _of_joints, stance.robot.torque_names, tuple(groups[name] for name in free)
+        )
+        found.append(Family("joints", tuple(f"{g}_weight" for g in free), bounds, weighed))
     return {family.name: family for family in found}
 
 

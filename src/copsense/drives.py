@@ -11,13 +11,14 @@ and a `Loop` is a pair of frames that a rod, a pin or a weld keeps together.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import finite_array, finite_number, owned, read_only
+from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 
 LoopKind = Literal["ball", "pin", "weld"]
@@ -105,8 +106,8 @@ class Loop:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class Transmission:
+@dataclass(frozen=True, eq=False, repr=False)
+class Transmission(ShortRepr):
     """Motors that drive several joints together: joint torques = matrix @ motor torques.
 
     Attributes:
@@ -148,8 +149,8 @@ class Transmission:
             object.__setattr__(self, "effort_limits", limits)
 
 
-@dataclass(frozen=True, eq=False)
-class Drives:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drives(ShortRepr):
     """What holds a robot's joints.
 
     Attributes:
@@ -178,7 +179,7 @@ class Drives:
             object.__setattr__(self, "motors", tuple(self.motors))
         for name in ("couplings", "loops", "transmissions"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        object.__setattr__(self, "springs", dict(self.springs))
+        object.__setattr__(self, "springs", FrozenMapping(self.springs))
         for joint, spring in self.springs.items():
             if not isinstance(spring, Spring):
                 raise InvalidInputError(
@@ -188,7 +189,7 @@ class Drives:
             joint: finite_number(torque, f"the torque held on joint {joint!r}")
             for joint, torque in self.held.items()
         }
-        object.__setattr__(self, "held", held)
+        object.__setattr__(self, "held", FrozenMapping(held))
         followers = [coupling.joint for coupling in self.couplings]
         _reject_twice(followers, "follows two joints")
         driven = [joint for each in self.transmissions for joint in each.joints]
@@ -234,6 +235,42 @@ class Drives:
             tuple(each for each in self.transmissions if kept.issuperset(each.joints)),
         )
 
+    def without_motors(self, passive: Iterable[str], joints: Iterable[str]) -> Drives:
+        """The same drives without motors on some joints; followers have none anyway.
+
+        Args:
+            passive: names of joints; of one with several degrees of freedom, all of them.
+            joints: label of each degree of freedom behind the base (n,).
+
+        Raises:
+            UnknownNameError: a joint is not one of them.
+            InvalidInputError: a transmission drives it.
+        """
+        names = tuple(joints)
+        idle = set(_labels(passive, names, "joint without a motor"))
+        for each in self.transmissions:
+            if shared := idle.intersection(each.joints):
+                raise InvalidInputError(
+                    f"joint {min(shared)!r} is driven by {', '.join(each.motors)}. Give drives "
+                    "without that transmission (drives=Drives(...))."
+                )
+        return replace(self, motors=tuple(j for j in self._own(names) if j not in idle))
+
+    def with_motors(self, driven: Iterable[str], joints: Iterable[str]) -> Drives:
+        """The same drives with motors on some joints too; arguments and errors alike."""
+        names = tuple(joints)
+        more = _labels(driven, names, "joint with a motor")
+        have = {*self._own(names), *more}
+        return replace(self, motors=tuple(joint for joint in names if joint in have))
+
+    def _own(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The joints with a motor of their own."""
+        if self.motors is not None:
+            return self.motors
+        elsewhere = {coupling.joint for coupling in self.couplings}
+        elsewhere |= {joint for each in self.transmissions for joint in each.joints}
+        return tuple(joint for joint in names if joint not in elsewhere)
+
     def on(self, joints: Iterable[str]) -> Actuation | None:
         """Which torques these motors exert on a robot's joints; None if each joint has its own.
 
@@ -256,11 +293,8 @@ class Drives:
                     raise UnknownNameError(f"joint of a {what}", joint, names)
         if self.motors is None and not self.couplings and not self.transmissions:
             return None
-        elsewhere = {coupling.joint for coupling in self.couplings}
-        elsewhere |= {joint for each in self.transmissions for joint in each.joints}
-        own = [j for j in names if j not in elsewhere] if self.motors is None else self.motors
         columns: list[tuple[int, str, np.ndarray]] = []
-        for joint in own:
+        for joint in self._own(names):
             at = names.index(joint)
             columns.append((at, joint, np.eye(len(names))[at]))
         for each in self.transmissions:
@@ -275,8 +309,8 @@ class Drives:
         return Actuation(motors, np.array([c for _, _, c in columns]).reshape(-1, len(names)).T)
 
 
-@dataclass(frozen=True, eq=False)
-class Actuation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Actuation(ShortRepr):
     """Which joint torques the motors can exert: S t_m, and what they cannot.
 
     Attributes:
@@ -303,6 +337,19 @@ class Actuation:
             free = np.linalg.svd(S)[0][:, k:].T.copy()
         object.__setattr__(self, "inverse", read_only(inverse))
         object.__setattr__(self, "free", read_only(free))
+
+
+def _labels(given: Iterable[str], names: tuple[str, ...], what: str) -> list[str]:
+    """Joints as the labels of their degrees of freedom."""
+    if isinstance(given, str):
+        raise InvalidInputError(f"{given!r} is one name. Give a list of joints, [{given!r}].")
+    found = []
+    for joint in given:
+        labels = [name for name in names if name == joint or name.startswith(f"{joint}[")]
+        if not labels:
+            raise UnknownNameError(what, joint, names)
+        found += labels
+    return found
 
 
 def _reject_twice(names: Iterable[str], how: str) -> None:

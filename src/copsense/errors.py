@@ -90,11 +90,13 @@ class UnbalancedError(CopsenseError):
     """Joints without a motor cannot be held at a posture, whatever shares the load.
 
     Attributes:
+        robot: the robot's name.
         lacking: joint, or direction of the base -> force or moment that is missing [N, Nm].
     """
 
     def __init__(self, robot: str, lacking: dict[str, float]) -> None:
         """Compose the message from what is missing where."""
+        self.robot = robot
         self.lacking = lacking
         told = ", ".join(f"{joint} lacks {missing:.3g}" for joint, missing in lacking.items())
         super().__init__(
@@ -102,6 +104,10 @@ class UnbalancedError(CopsenseError):
             "want of a motor. Give the joint a motor, a spring or a held torque, let it hang at "
             "its own equilibrium, or add a contact."
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built from the data, not from the message."""
+        return type(self), (self.robot, self.lacking)
 
 
 class InsufficientContactsError(CopsenseError):

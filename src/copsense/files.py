@@ -97,7 +97,7 @@ def load_configurations(path: str | Path) -> Float[np.ndarray, "N nq"]:
             rows = np.load(path) if npy else np.loadtxt(path, delimiter=",", ndmin=2)
     except (OSError, ValueError, EOFError) as error:
         raise InvalidInputError(
-            f"{path} is not a table of configurations: {error}. {need}."
+            f"{path} is not a table of configurations: {str(error).rstrip('.')}. {need}."
         ) from None
     if not isinstance(rows, np.ndarray) or not rows.size:
         raise InvalidInputError(f"{path} holds no table of configurations. {need}.")

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from copsense.arrays import array_property, finite_number, owned, read_only
-from copsense.contact import Contact
-from copsense.content import ByContent, own, plain, show
+from copsense.contact import Contact, edge_row
+from copsense.content import ByContent, ShortRepr, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
@@ -150,8 +150,8 @@ def _of(limit: float | Mapping[str, float] | None, contact: Contact) -> float | 
 NO_LIMITS = Limits(normal_force=None, friction=None, cop_margin=None, torsion=None)
 
 
-@dataclass(frozen=True, eq=False)
-class LimitRows:
+@dataclass(frozen=True, eq=False, repr=False)
+class LimitRows(ShortRepr):
     """Limits at a stance. Contact rows are constant along a path, torque limits are not.
 
     Attributes:
@@ -369,10 +369,7 @@ def _cop_rows(contact: Contact, sole: Polygon, margin: float) -> list[Row]:
         beside = np.array([a @ sole.vertices[0] for a in sides.normals])
         names = [f"the {sides.side(i)} side" for i in range(2)]
         edges += zip(sides.normals, beside, names, strict=True)
-    return [
-        ("cop", f"CoP at {name}", np.array([0.0, 0.0, -b, a[1], -a[0], 0.0]), 0.0)
-        for a, b, name in edges
-    ]
+    return [("cop", f"CoP at {name}", -edge_row(a, b), 0.0) for a, b, name in edges]
 
 
 def _require_room(contact: Contact, sole: Polygon, margin: float) -> None:

@@ -17,11 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import read_only
+from copsense.content import ShortRepr
 from copsense.stance import Stance
 
 
-@dataclass(frozen=True, eq=False)
-class LoadProblem:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadProblem(ShortRepr):
     """Which contact forces f are allowed, and which torques they take.
 
     A controller's arrays are good until its next step: copy what is to be kept.
@@ -49,7 +51,8 @@ class LoadProblem:
         if robot.actuation is not None:
             map_, N = robot.by_drive(map_), robot.by_drive(N)
             inertia = robot.actuation.inverse @ inertia @ robot.actuation.inverse.T
-        return cls(map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
+        parts = (map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
+        return cls(*map(read_only, parts))
 
     def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
         """The torques that contact forces take (n,) [Nm]."""

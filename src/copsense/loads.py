@@ -6,7 +6,7 @@ that changes with the posture depends on what the wrench is fixed to (theory2.md
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from copsense import rigid_body
 from copsense.arrays import finite_array, owned, read_only
+from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
@@ -85,8 +86,8 @@ class SpringLoad:
 AnyLoad = Load | SpringLoad
 
 
-@dataclass(frozen=True, eq=False)
-class AppliedLoads:
+@dataclass(frozen=True, eq=False, repr=False)
+class AppliedLoads(ShortRepr):
     """Loads on a robot at a configuration.
 
     Attributes:
@@ -101,7 +102,7 @@ class AppliedLoads:
     balanced: Float[np.ndarray, " nv"]
     wrenches: Float[np.ndarray, "k 6"]
     points: Float[np.ndarray, "k 3"]
-    forces: dict[int, pin.Force]
+    forces: Mapping[int, pin.Force]
     derivative: Float[np.ndarray, "nv nv"]
 
 
@@ -144,7 +145,11 @@ def apply_loads(
         forces[joint] = forces[joint] + spatial if joint in forces else spatial
     points = np.array([here.translation for here in places]).reshape(-1, 3)
     return AppliedLoads(
-        read_only(balanced), read_only(wrenches), owned(points), forces, read_only(derivative)
+        read_only(balanced),
+        read_only(wrenches),
+        owned(points),
+        FrozenMapping(forces),
+        read_only(derivative),
     )
 
 

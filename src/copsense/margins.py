@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from copsense.arrays import read_only
 from copsense.contact import Contact
 from copsense.limits import LimitRows, Limits, limit_rows
 from copsense.stance import Stance
@@ -71,10 +72,15 @@ class MarginTable:
         self._cop = np.flatnonzero([kind == "cop" for kind in rows.kinds])
         self._under = fz[np.array(rows.contacts, dtype=int)[self._cop]]
         keys = list(zip(self.where, self.kinds, strict=True))
-        self.groups: list[Int[np.ndarray, " k"]] = [
-            np.array([i for i, other in enumerate(keys) if other == key])
+        self.groups: tuple[Int[np.ndarray, " k"], ...] = tuple(
+            read_only(np.array([i for i, other in enumerate(keys) if other == key]))
             for key in dict.fromkeys(keys)
-        ]
+        )
+
+    def __repr__(self) -> str:
+        """How many rows and groups, and of which kinds."""
+        kinds = ", ".join(dict.fromkeys(self.kinds)) or "none"
+        return f"MarginTable({len(self.names)} rows in {len(self.groups)} groups; kinds: {kinds})"
 
     def values(
         self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]

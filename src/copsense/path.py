@@ -13,7 +13,8 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_number
+from copsense.arrays import finite_number, read_only
+from copsense.content import freeze
 from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
 from copsense.stance import Stance
@@ -48,6 +49,10 @@ class PosturePath:
     tangents: Float[np.ndarray, "N nv"]
     failures: Mapping[int, str] = field(default_factory=dict)
     solver: PostureSolver | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        """Own the arrays and the reasons."""
+        freeze(self, "values", "tangents", "failures")
 
     def __len__(self) -> int:
         """Number of postures."""
@@ -180,9 +185,17 @@ class LateralPath:
             raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
         self.stance = stance
         steps = np.linspace(-reach, reach, 2 * samples + 1)
-        self.values: Float[np.ndarray, " p"] = float(stance.com[1]) + steps
+        self.values: Float[np.ndarray, " p"] = read_only(float(stance.com[1]) + steps)
         self._solver = _Lateral(stance, _held_x(stance), None)
         self._found: dict[float, tuple[Stance, np.ndarray] | str] = {}
+
+    def __repr__(self) -> str:
+        """Robot, range, and how many postures are solved so far."""
+        low, high = self.values[0], self.values[-1]
+        return (
+            f"LateralPath({self.stance.robot.name!r}, com_y from {low:.4g} to {high:.4g} m, "
+            f"{len(self._found)} postures solved so far)"
+        )
 
     def __len__(self) -> int:
         """Number of postures that a search looks at first."""
@@ -255,7 +268,7 @@ def path_through(
     Args:
         stance: says where the contacts are.
         configurations: the configurations (nq,), in order.
-        project: move each onto the manifold instead of refusing one that has moved a contact.
+        project: move each onto the manifold instead of rejecting one that has moved a contact.
         strict: raise at a configuration that cannot be used; False lists it in
             `PosturePath.failures`.
 

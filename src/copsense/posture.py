@@ -13,12 +13,15 @@ from numpy.typing import ArrayLike
 from copsense.arrays import finite_array, finite_number, owned
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
-from copsense.stance import Stance
+from copsense.freedom import missing_joints
+from copsense.stance import RANK_TOLERANCE, Stance
 
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 _STATIONARITY = 1e-11  # on the cost's gradient along the manifold
 _NEWTON_REGION = 1e-2  # constraint error under which the exact curvature is used
+_PIVOT = 3e-6  # of the constraints' Cholesky factor, relative, from which they are independent
 _LONGEST_STEP = 0.3  # rad or m: longer Newton steps are shortened
+_RUNAWAY = 1e3  # rad or m, per unit requested, of a motion that is held but for rounding
 _MAX_ITERATIONS = 100
 
 
@@ -134,37 +137,46 @@ def solve_posture(
         )
         swing = here.hanging_derivative / robot.weight
         C = np.vstack([here.constraints, swing, here.com_jacobian[axes], selector])
+        A, errors, spread = _independent(here, C, h)
         gradient, hessian = _cost_derivatives(here, home, weights)
-        if multipliers is None:
-            multipliers = np.linalg.lstsq(C.T, -gradient, rcond=1e-10)[0]
-        stationarity = gradient + C.T @ multipliers
+        if multipliers is None or spread is not None or len(multipliers) != len(A):
+            multipliers = np.linalg.lstsq(A.T, -gradient, rcond=1e-10)[0]
+        stationarity = gradient + A.T @ multipliers
         small = float(np.abs(h).max())
         if small < _NEWTON_REGION:
             # Curvature of the Lagrangian, sum lambda d2h: a static torque derivative in which
             # gravity stands for the CoM's multiplier and the contact forces for the feet's.
+            of_h = multipliers if spread is None else (spread @ multipliers)[: len(h)]
             rows = len(here.constraints)
             pull = np.zeros(3)
             start = rows + len(hanging)
-            pull[axes] = multipliers[start : start + len(axes)]
-            hessian = hessian + here.curvature(-multipliers[:rows], -pull / robot.mass)
-        K = np.block([[hessian, C.T], [C, np.zeros((len(h), len(h)))]])
+            pull[axes] = of_h[start : start + len(axes)]
+            hessian = hessian + here.curvature(-of_h[:rows], -pull / robot.mass)
+        K = _bordered(hessian, A)
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
+            # Rates of h: one for each request, and none of what is held to second order only.
             requests = len(axes) + len(columns)
-            rate = np.zeros((len(K), requests))
-            rate[len(K) - requests :] = np.eye(requests)
-            tangents = _solve(K, rate)[: robot.model.nv]
+            rate = np.zeros((len(h) if spread is None else len(spread), requests))
+            rate[len(h) - requests : len(h)] = np.eye(requests)
+            right = np.zeros((len(K), requests))
+            right[robot.model.nv :] = rate if spread is None else spread.T @ rate
+            tangents = _solve(K, right)[: robot.model.nv]
             # What the contacts hold fast has no tangent: least squares would move a contact.
-            missed = np.abs(C @ tangents - rate[len(K) - len(h) :]).max(axis=0, initial=0.0)
-            tangents[:, missed > 1e-6 * np.abs(tangents).max(axis=0, initial=1.0)] = 0.0
+            whole = C if spread is None else np.vstack([C, here.fold_equations[0]])
+            missed = np.abs(whole @ tangents - rate).max(axis=0, initial=0.0)
+            fastest = np.abs(tangents).max(axis=0, initial=1.0)
+            runs_away = (fastest > _RUNAWAY) & (spread is not None)
+            tangents[:, (missed > 1e-6 * fastest) | runs_away] = 0.0
             return Posture(stance.at(here.q), tangents, iteration)
-        step = _solve(K, -np.concatenate([stationarity, h]))
+        step = _solve(K, -np.concatenate([stationarity, errors]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
         before = here
         here = here.at(
             pin.integrate(robot.model, here.q, length * step[: robot.model.nv]), check=False
         )
-        multipliers = _carried(multipliers + length * step[robot.model.nv :], before, here)
-    raise UnreachablePostureError(_what_remains(stance, h, axes, list(joints), wanted))
+        multipliers = multipliers + length * step[robot.model.nv :]
+        multipliers = _carried(multipliers, before, here) if spread is None else None
+    raise UnreachablePostureError(_what_remains(here, h, axes, list(joints), wanted))
 
 
 def carry_payload(
@@ -226,7 +238,7 @@ def pull_back(stance: Stance, targets: Sequence[pin.SE3]) -> Stance:
         step = -np.linalg.lstsq(rows, error, rcond=rcond)[0]
         step *= min(1.0, _LONGEST_STEP / max(float(np.abs(step).max()), 1e-300))
         here = here.at(pin.integrate(model, here.q, step), check=False)
-    raise UnreachablePostureError(_what_remains(stance, error, [], [], []))
+    raise UnreachablePostureError(_what_remains(here, error, [], [], []))
 
 
 def contact_error(stance: Stance, targets: Sequence[pin.SE3]) -> Float[np.ndarray, " m"]:
@@ -294,8 +306,44 @@ def _cost_derivatives(
     return weights * deviation, hessian
 
 
+def _bordered(hessian: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """[H A'; A 0]; written out, for `np.block` takes longer than the equations."""
+    n = len(hessian)
+    K = np.zeros((n + len(A), n + len(A)))
+    K[:n, :n] = hessian
+    K[n:, :n] = A
+    K[:n, n:] = A.T
+    return K
+
+
+def _independent(
+    here: Stance, C: np.ndarray, h: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
+    """Equations A dq = -e that say what C dq = -h says, without what it says twice.
+
+    Returns:
+        A, e, and U with A = U' [C; F], where F are the stance's fold equations; where the rows of
+        C are independent, C, h and None.
+    """
+    try:
+        pivots = np.linalg.cholesky(C @ C.T).diagonal()
+        if len(pivots) and pivots.min() > _PIVOT * pivots.max():
+            return C, h, None
+    except np.linalg.LinAlgError:
+        pass
+    rows, errors = here.fold_equations
+    u, s, _ = np.linalg.svd(np.vstack([C, rows]), full_matrices=False)
+    spread = u[:, s > RANK_TOLERANCE * max(1.0, s[0])]
+    return spread.T @ np.vstack([C, rows]), spread.T @ np.concatenate([h, errors]), spread
+
+
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve, or take the minimum-norm least squares where constraints are redundant."""
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        raise UnreachablePostureError(
+            "the search for a posture left all bounds: numbers of the model are too large or too "
+            "small for it. Check its lengths [m], masses [kg] and angles [rad]."
+        )
     try:
         solution = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError:
@@ -330,9 +378,12 @@ def _what_remains(
     left = labels[worst].format(abs(h[worst]))
     if abs(h[worst]) < TOLERANCE:
         left = "they are in place, but the search for the nearest posture does not settle"
+    lacking = "; ".join(missing_joints(stance))
     return (
         f"no posture of {stance.robot.name!r} with the contacts in place was found"
         + (f" for {asked}" if asked else "")
-        + f": {left}. Ask for less, start from a nearer posture, or leave out a contact that "
-        "says what another says already."
+        + f": {left}. "
+        + (f"{lacking[0].upper()}{lacking[1:]}. " if lacking else "")
+        + "Ask for less, start from a nearer posture, or leave out a contact that says what "
+        "another says already."
     )

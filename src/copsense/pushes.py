@@ -22,6 +22,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, read_only
+from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import LimitRows, Limits, limit_rows
@@ -43,8 +44,8 @@ _MERGE = 1e-7  # of the weight: vertices nearer to the line of their neighbours 
 _STILL = 1e-9  # of a row's size: what rounding leaves of one that no push moves
 
 
-@dataclass(frozen=True, eq=False)
-class PushRegion:
+@dataclass(frozen=True, eq=False, repr=False)
+class PushRegion(ShortRepr):
     """The horizontal pushes that one way of sharing the load can answer.
 
     Attributes:
@@ -117,8 +118,8 @@ class PushRegion:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Pushes:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pushes(ShortRepr):
     """The largest pushes at a point of a robot that stands still.
 
     Attributes:
@@ -136,6 +137,10 @@ class Pushes:
     limits: Limits
     any: PushRegion
     criteria: tuple[PushRegion, ...]
+
+    def __post_init__(self) -> None:
+        """Own the array."""
+        freeze(self, "point")
 
     @property
     def regions(self) -> tuple[PushRegion, ...]:

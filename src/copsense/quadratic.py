@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from scipy.linalg import lapack
 
 from copsense.arrays import array_property
+from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
@@ -17,8 +18,8 @@ from copsense.stance import Stance
 _SINGULAR = 1e-12  # reciprocal condition of the joints' inertia under which it has no inverse
 
 
-@dataclass(frozen=True, eq=False)
-class Quadratic:
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadratic(ShortRepr):
     """A criterion's matrices on a robot's contacts: W_tau = torque + inertia * M_j^-1, W_f.
 
     Attributes:

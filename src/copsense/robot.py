@@ -19,6 +19,7 @@ from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
+from copsense.urdf_drives import read_urdf_drives
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
 _FLOATING = ("JointModelFreeFlyer", "JointModelPlanar")
@@ -43,6 +44,7 @@ _NAMED = (
     pin.FrameType.SENSOR,
 )
 
+_ABSURD = 1e9  # lengths [m] and inertias [kg m^2] of no robot, whatever its units were
 # Effort limits from here on are a modeller's "no limit", not a motor's.
 PLACEHOLDER_EFFORT = 1e4  # Nm, or N
 # Positions beyond this are how a parser writes infinity.
@@ -60,6 +62,7 @@ class Robot:
         notes: what its description says and copsense does not use, a sentence each; every command
             prints them.
         drives: which joints have motors, springs and couplings, and the loops among its links.
+        payloads: masses that `with_payload` fixed to it; its model holds them already.
         mjcf: what was read from an MJCF, with every joint of the file; None for other robots.
     """
 
@@ -68,6 +71,7 @@ class Robot:
     description: Description | None = None
     notes: tuple[str, ...] = ()
     drives: Drives = field(default_factory=Drives)
+    payloads: tuple[Payload, ...] = ()
     mjcf: MjcfReading | None = None
 
     def __post_init__(self) -> None:
@@ -116,12 +120,14 @@ class Robot:
         bad = [
             model.names[i]
             for i in range(model.njoints)
-            if not (np.all(np.isfinite(numbers[i])) and np.all(np.isfinite(placed[i])))
+            # Comparisons are false for what is not a number.
+            if not (np.all(np.abs(numbers[i]) < _ABSURD) and np.all(np.abs(placed[i]) < _ABSURD))
         ]
         if bad:
             raise InvalidInputError(
                 f"robot {self.name!r} has a centre of mass, inertia or placement that is not "
-                f"finite at {', '.join(bad)}. Correct the model."
+                f"finite, or beyond {_ABSURD:g} m or kg m^2, at {', '.join(bad)}. Correct the "
+                "model."
             )
         if not 0 < np.linalg.norm(model.gravity.linear) < np.inf:
             raise InvalidInputError(
@@ -204,6 +210,15 @@ class Robot:
         """
         return replace(self, drives=drives)
 
+    def without_motors(self, joints: Iterable[str]) -> Robot:
+        """The same robot where these joints have no motor.
+
+        Raises:
+            UnknownNameError: a joint is not in the model.
+            InvalidInputError: a transmission drives one.
+        """
+        return self.with_drives(self.drives.without_motors(joints, self.dof_names))
+
     def with_payload(
         self,
         frame: str,
@@ -238,17 +253,20 @@ class Robot:
         model.appendBodyToJoint(
             at.parentJoint, pin.Inertia(kg, np.array(place), np.array(about)), at.placement
         )
-        return replace(self, model=model)
+        payload = Payload(frame, kg, tuple(float(c) for c in place))  # type: ignore[arg-type]
+        return replace(self, model=model, payloads=(*self.payloads, payload))
 
     @classmethod
     def from_description(cls, description: Description, *, name: str | None = None) -> Robot:
         """Build the model of a description."""
         if description.language == "urdf":
-            model = _build_urdf(description)
-            return cls(name or model.name or "robot", model, description, description.notes)
+            found = read_urdf_drives(description.text, _build_urdf(description))
+            notes, model = (*description.notes, *found.notes), found.model
+            return cls(name or model.name or "robot", model, description, notes, found.drives)
         read = read_mjcf(description)
         notes = (*description.notes, *read.notes)
-        return cls(name or read.model.name or "robot", read.model, description, notes, mjcf=read)
+        title = name or read.model.name or "robot"
+        return cls(title, read.model, description, notes, read.drives, mjcf=read)
 
     def keeping(self, joints: Iterable[str]) -> Robot:
         """The same robot with every other joint locked at zero.
@@ -534,6 +552,21 @@ class Robot:
     def __repr__(self) -> str:
         """Name, joints and mass."""
         return f"Robot({self.name!r}, {len(self.dof_names)} joints, {self.mass:.4g} kg)"
+
+
+@dataclass(frozen=True)
+class Payload:
+    """A mass fixed to a robot.
+
+    Attributes:
+        frame: name of the frame that carries it.
+        mass: [kg].
+        com: its centre of mass in the frame [m].
+    """
+
+    frame: str
+    mass: float
+    com: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

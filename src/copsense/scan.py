@@ -85,6 +85,14 @@ class PathScan:
         self._begin = nearest if near or not path.continuous else self.start
         self._points: dict[float, ScanPoint] = {}
 
+    def __repr__(self) -> str:
+        """Criterion, limits, path, and how many postures are solved so far."""
+        within = "" if self.limits is None else f" within {self.limits!r}"
+        return (
+            f"PathScan({self.criterion.name}{within} along {self.path!r}, from {self.start:.4g}; "
+            f"{len(self._points)} equilibria so far)"
+        )
+
     @property
     def begin(self) -> ScanPoint:
         """Where a search sets out: at the start, or at the posture nearest to it."""

@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import read_only
+from copsense.content import freeze
 from copsense.cop import contact_cops
 from copsense.errors import CopsenseError
 from copsense.sensitivity import CopSensitivity, cop_rates, sensitivity_of
@@ -15,7 +17,7 @@ from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ScanPoint:
     """The equilibrium at one posture of a path, and its derivatives along the path.
 
@@ -28,6 +30,14 @@ class ScanPoint:
     value: float
     tangent: Float[np.ndarray, " nv"]
     equilibrium: StaticEquilibrium
+
+    def __post_init__(self) -> None:
+        """Own the tangent."""
+        freeze(self, "tangent")
+
+    def __repr__(self) -> str:
+        """The coordinate and the equilibrium there."""
+        return f"ScanPoint(at {self.value:.6g}: {self.equilibrium!r})"
 
     @property
     def stance(self) -> Stance:
@@ -69,7 +79,8 @@ class ScanPoint:
     def _derivatives(self) -> tuple[np.ndarray, np.ndarray]:
         """Of forces and torques along the path, and along CoM x and y."""
         directions = np.column_stack([self.tangent, self.stance.com_motions])
-        return self.equilibrium.derivative(directions)
+        forces, torques = self.equilibrium.derivative(directions)
+        return read_only(forces), read_only(torques)
 
 
 def rates_or_nan(point: ScanPoint) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from copsense.arrays import array_property, finite_array, finite_number, owned, read_only
+from copsense.arrays import array_property, finite_array, finite_number, read_only
+from copsense.content import freeze
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
@@ -28,10 +29,11 @@ from copsense.statics import (
 
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 _STILL = 1e-12  # gains under which nothing moves
+_LISTED = 6  # contacts that the representation lists
 _ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CopSensitivity:
     """The static centre-of-pressure sensitivity of a stance ([Romano2016] Eq. (11)).
 
@@ -53,8 +55,20 @@ class CopSensitivity:
 
     def __post_init__(self) -> None:
         """Own the arrays."""
-        for name in ("cop", "matrix", "wrench_derivative", "torque_derivative"):
-            object.__setattr__(self, name, owned(getattr(self, name)))
+        freeze(self, "basis", "cop", "matrix", "wrench_derivative", "torque_derivative")
+
+    def __repr__(self) -> str:
+        """The equilibrium, and where each contact's CoP is and how it moves with the CoM."""
+        names = self.equilibrium.stance.contact_names
+        lines = [
+            f"  {name}: CoP ({x * 1e3:.1f}, {y * 1e3:.1f}) mm, |dCoP/dCoM| {gain:.3f}"
+            for name, (x, y), gain in zip(
+                names, self.cop, np.linalg.norm(self.com_gain, 2, axis=(1, 2)), strict=True
+            )
+        ]
+        if len(lines) > _LISTED:
+            lines[_LISTED:] = [f"  and {len(names) - _LISTED} more contacts"]
+        return "\n".join([f"CopSensitivity of {self.equilibrium!r}", *lines])
 
     @array_property
     def gradient(self) -> Float[np.ndarray, "nc 2 nv"]:
@@ -142,7 +156,7 @@ class CopSensitivity:
         return equilibrium.next_active_set_change(t / speed)
 
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
-        """d cop / d joint [m/rad] along a path with this tangent."""
+        """d cop / d joint along a path with this tangent [m/rad, or m/m of a prismatic joint]."""
         index = self.equilibrium.stance.robot.velocity_index(joint)
         t = finite_array(tangent, "the tangent", (len(self.basis),), "a velocity")
         return self.along(t, float(t[index]))
@@ -161,7 +175,7 @@ class CopSensitivity:
 
         Rows: CoP x, y in contact axes; columns: CoM x, y in world axes.
         """
-        return self.matrix.dot(self.basis.T.dot(self.com_motions))
+        return self.matrix.dot(self._com_coordinates)
 
     @array_property
     def load_gain(self) -> Float[np.ndarray, "nc 2"]:
@@ -169,8 +183,17 @@ class CopSensitivity:
 
         Columns: CoM x, y in world axes.
         """
-        along = self.basis.T.dot(self.com_motions)
-        return self.wrench_derivative[:, 2].dot(along) / self.equilibrium.stance.robot.weight
+        return self._wrench_gain[:, 2] / self.equilibrium.stance.robot.weight
+
+    @array_property
+    def _wrench_gain(self) -> Float[np.ndarray, "nc 6 2"]:
+        """Change of the wrenches per CoM travel, CoM x and y in world axes."""
+        return self.wrench_derivative.dot(self._com_coordinates)
+
+    @array_property
+    def _com_coordinates(self) -> Float[np.ndarray, "p 2"]:
+        """The motions `com_motions` in the basis."""
+        return np.asarray(self.basis.T.dot(self.com_motions))
 
     @array_property
     def unloading_travel(self) -> Float[np.ndarray, " nc"]:
@@ -221,28 +244,19 @@ class CopSensitivity:
     @cached_property
     def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
         stance = self.equilibrium.stance
+        # s = w (b - a p) is linear in the wrench: one row gives the slack and its rate.
+        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1))
+        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
+        speed = np.hypot(rate[:, 0], rate[:, 1])
+        # An edge that stands still and is passed already leaves no way back.
+        distance = np.where(slack < -_ON_EDGE, -np.inf, np.inf)
+        np.divide(slack, speed, out=distance, where=speed > _STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
-        shares = self.equilibrium.wrenches[:, 2] / stance.robot.weight
-        for k, contact in enumerate(stance.contacts):
-            if contact.sole is None:
-                continue
-            # s = w (b - a p),   ds/dCoM = (b - a p) dw/dCoM - w a' Gamma
-            a, margin = contact.sole.normals, contact.sole.distances(self.cop[k])
-            w = float(shares[k])
-            slack = w * margin
-            rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
-            speed = np.hypot(rate[:, 0], rate[:, 1])
-            moving = speed > _STILL
-            if moving.all():
-                distance = slack / speed
-            else:
-                distance = np.full(len(speed), np.inf)
-                np.divide(slack, speed, out=distance, where=moving)
-                # An edge that stands still and is passed already leaves no way back.
-                distance[~moving & (slack < -_ON_EDGE)] = -np.inf
-            i = int(distance.argmin())
-            if distance[i] < np.inf:
-                travel[k], edge[k] = distance[i], i
+        for k, rows in enumerate(stance.edges):
+            if rows.start < rows.stop:
+                i = int(distance[rows].argmin())
+                if distance[rows][i] < np.inf:
+                    travel[k], edge[k] = distance[rows][i], i
         return read_only(travel), read_only(edge)
 
 

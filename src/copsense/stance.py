@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
-from scipy.linalg import lapack
+from scipy.linalg import block_diag, lapack
 
 from copsense import rigid_body
 from copsense.arrays import array_property, read_only
@@ -29,12 +29,18 @@ from copsense.errors import (
 from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads, turning
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
+from copsense.row_space import RowSpace
 
-# Singular values of the contact Jacobian, lengths in metres, below which a direction is lost.
-RANK_TOLERANCE = 1e-9
+# Singular values of the contact Jacobian, lengths in metres, below which a direction is lost. A
+# posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
+# without ankle roll do, its singular value is then known to the root of that.
+RANK_TOLERANCE = 1e-6
+# Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
+_CURVED = 1e-4
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
+_FOLDED = 1e-2  # the same where the contacts hold motions to second order only
 _APART = 1e-3  # from here on the CoM's two directions are far from depending on each other
 # How far a contact may lie from its stated plane.
 POSITION_TOLERANCE = 1e-6  # m
@@ -96,8 +102,7 @@ class Stance:
         if check:
             for k, contact in enumerate(contacts):
                 _check_plane(contact, feet[k])
-            if not any(contact.kind == "surface" for contact in contacts):
-                _check_support(self)
+            check_support(self)
             if self.closures is not None:
                 _check_closed(self.closures)
 
@@ -173,6 +178,20 @@ class Stance:
     def component_index(self) -> Int[np.ndarray, " m"]:
         """For each row of stacked forces, its component 0..5 among (fx, fy, fz, mx, my, mz)."""
         return self._layout.component_index
+
+    @property
+    def edge_rows(self) -> Float[np.ndarray, "e k"]:
+        """Rows of the soles' edges: times wrenches (nc, 6), stacked, the edges' slacks [m].
+
+        The slack of an edge is w (b - a . p), with w the contact's share of the weight. See
+        `Contact.edge_rows`.
+        """
+        return self._layout.edge_rows
+
+    @property
+    def edges(self) -> tuple[slice, ...]:
+        """Rows of each contact in `edge_rows`, none where it has no sole."""
+        return self._layout.edges
 
     @array_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
@@ -264,9 +283,9 @@ class Stance:
         return tuple(int(i) for i in self.robot.model.supports[joint] if i > 1)
 
     @cached_property
-    def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        u, s, vt = np.linalg.svd(self.constraints, full_matrices=True)
-        return u, s, vt
+    def _motions(self) -> RowSpace:
+        tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
+        return RowSpace(self.constraints, tolerance, least=1.0)
 
     @cached_property
     def hanging(self) -> tuple[int, ...]:
@@ -288,26 +307,66 @@ class Stance:
         still = np.zeros(len(self.constraints))
         return self.balance_derivative(still)[list(self.hanging)]
 
-    @cached_property
+    @property
     def rank(self) -> int:
         """Rank of `constraints`; less than its rows when contacts are redundant."""
-        singular = self._svd[1]
-        tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
-        return int(np.sum(singular > tolerance * max(1.0, singular[0])))
+        return self._motions.rank
 
     @array_property
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
         """Orthonormal basis Z of the velocities that move no contact and open no loop: J Z = 0.
 
-        Joints that hang follow as gravity and their springs tell them.
+        Without the `false_motions`, which J alone would allow. Joints that hang follow as gravity
+        and their springs tell them.
         """
-        Z = self._svd[2][self.rank :].T.copy()
+        Z = self._motions.null
+        count = self.false_motions.shape[1]
+        if count:
+            Z = Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T
         if not self.hanging:
             return Z
         rows = self.hanging_derivative @ Z
         _, s, vt = np.linalg.svd(rows)
         lost = int(np.sum(s > CLOSURE_RANK * max(s.max(initial=0.0), self.robot.weight * 1e-3)))
         return np.asarray(Z @ vt[lost:].T)
+
+    @array_property
+    def false_motions(self) -> Float[np.ndarray, "nv k"]:
+        """Orthonormal motions v with J v = 0 that can be followed to first order only.
+
+        Where J is deficient, y' J = 0, a motion moves the contacts by v' Q v / 2 along y to second
+        order, Q = d(J' y)/dq. Where Q is definite on some motions and zero on the others, as for
+        the pelvis' roll on two legs without ankle roll, those cannot be followed at all.
+        """
+        return self._folds[0]
+
+    @property
+    def fold_equations(self) -> tuple[Float[np.ndarray, "k nv"], Float[np.ndarray, " k"]]:
+        """Rows F and errors e, F dq = -e, by which J comes to be deficient along `false_motions`.
+
+        Contacts that hold a motion to second order are in place where e = 0, and Newton's method on
+        them alone only halves its error.
+        """
+        return self._folds[1:]
+
+    @cached_property
+    def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        u, Z = self._motions.redundant, self._motions.null
+        if not u.shape[1]:
+            return read_only(Z[:, :0]), read_only(Z.T[:0]), read_only(np.zeros(0))
+        motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
+        for y in u.T:
+            turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
+            values, vectors = np.linalg.eigh(Z.T @ (turned + turned.T) @ Z / 2)
+            curved = np.abs(values) > _CURVED
+            if curved.any() and (np.all(values[curved] > 0) or np.all(values[curved] < 0)):
+                false = Z @ vectors[:, curved]
+                motions.append(false)
+                rows.append(false.T @ turned)
+                errors.append(false.T @ self.constraints.T @ y)
+        left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
+        found = left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
+        return read_only(found[0]), read_only(found[1]), read_only(found[2])
 
     @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:
@@ -342,12 +401,13 @@ class Stance:
         if area > _APART * (a + c) ** 2:
             inverse = np.array([[c, -b], [-b, a]]) / area
             return np.asarray(motions.dot(speeds.T).dot(inverse))
-        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=_LOST))
+        lost = _FOLDED if self.false_motions.shape[1] else _LOST
+        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=lost))
 
     @property
     def redundant_directions(self) -> tuple[str, ...]:
         """Rows of stacked forces that take part in wrenches no motion can feel (J' f = 0)."""
-        null = self._svd[0][: len(self.row_names), self.rank :]
+        null = self._motions.redundant[: len(self.row_names)]
         share = np.linalg.norm(null, axis=1)
         return tuple(n for n, s in zip(self.row_names, share, strict=True) if s > 1e-6)
 
@@ -507,6 +567,8 @@ class _Layout:
         row_names: of stacked forces.
         component_index: component 0..5 of each row (m,).
         places: where each row stands among the contacts' wrenches, six numbers each (m,).
+        edge_rows: rows of the soles' edges over the contacts' wrenches, in shares of the weight.
+        edges: rows of each contact among them.
     """
 
     names: tuple[str, ...]
@@ -516,6 +578,8 @@ class _Layout:
     row_names: tuple[str, ...]
     component_index: Int[np.ndarray, " m"]
     places: Int[np.ndarray, " m"]
+    edge_rows: Float[np.ndarray, "e k"]
+    edges: tuple[slice, ...]
 
 
 @lru_cache(maxsize=32)  # a path's stances share theirs
@@ -544,15 +608,23 @@ def _layout(robot: Robot, contacts: tuple[Contact, ...]) -> _Layout:
     ends = np.cumsum([0] + [len(contact.components) for contact in contacts])
     component = np.array([i for contact in contacts for i in contact.components])
     owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
+    edges = block_diag(*(contact.edge_rows for contact in contacts)) / robot.weight
+    edge_ends = np.cumsum([0] + [len(contact.edge_rows) for contact in contacts])
     return _Layout(
         names,
         tuple(contact.on(robot) for contact in contacts),
         tuple((c.plane or Plane()).axes if c.kind == "point" else None for c in contacts),
-        tuple(slice(int(a), int(b)) for a, b in pairwise(ends)),
+        _slices(ends),
         tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in contacts for i in c.components),
         read_only(component),
         read_only(6 * owner + component),
+        read_only(edges),
+        _slices(edge_ends),
     )
+
+
+def _slices(ends: np.ndarray) -> tuple[slice, ...]:
+    return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
 def _check_plane(contact: Contact, foot: pin.SE3) -> None:
@@ -600,15 +672,24 @@ def _check_closed(closures: Closures) -> None:
         )
 
 
-def _check_support(stance: Stance) -> None:
-    """Reject contacts that cannot balance the base. A surface contact always can."""
+def check_support(stance: Stance) -> None:
+    """Reject contacts that cannot balance the base. A surface contact always can.
+
+    Raises:
+        InsufficientContactsError: a force or moment on the base is beyond them.
+    """
+    if any(contact.kind == "surface" for contact in stance.contacts):
+        return
     nb = stance.robot.base_nv
     base = stance.jacobian[:, :nb]
     rank = np.linalg.matrix_rank(base, tol=RANK_TOLERANCE * max(1.0, np.abs(base).max()))
     if rank < nb:
         kinds = ", ".join(f"{c.name} ({c.kind})" for c in stance.contacts)
+        two = [c.kind for c in stance.contacts] == ["point", "point"]
         raise InsufficientContactsError(
             f"the contacts of {stance.robot.name!r} ({kinds}) cannot balance every force and "
-            f"moment on its base: they span {rank} of {nb} directions. Use at least one surface "
-            "contact, or three point contacts that are not on one line."
+            f"moment on its base: they span {rank} of {nb} directions"
+            + (", as two points carry no moment about the line through them" if two else "")
+            + ". Use at least one surface contact, or three point contacts that are not on one "
+            "line."
         )

@@ -41,7 +41,7 @@ class LimitTravel:
     exact: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Travel:
     """What the CoM meets on its way to one side.
 
@@ -54,6 +54,16 @@ class Travel:
     direction: int
     limits: tuple[LimitTravel, ...]
     reach: float
+
+    def __repr__(self) -> str:
+        """The limit that is met first, and how far the path was followed."""
+        way = f"{'+' if self.direction > 0 else '-'}{self.reach * 1e3:.1f} mm"
+        if self.first is None or self.first.exact is None:
+            return f"Travel(none of {len(self.limits)} limits met within {way})"
+        return (
+            f"Travel({self.first.exact * 1e3:.1f} mm to {self.first.name}, the first of "
+            f"{len(self.limits)} limits; followed to {way})"
+        )
 
     @property
     def first(self) -> LimitTravel | None:

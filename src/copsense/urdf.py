@@ -17,6 +17,9 @@ _NUMBERS = {
     "mass": {"value": 1},
     "inertia": dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), 1),
     "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+    "mimic": dict.fromkeys(("multiplier", "offset"), 1),
+    "link1": {"xyz": 3, "rpy": 3},
+    "link2": {"xyz": 3, "rpy": 3},
 }
 # Attributes without which the parser drops the element, or rejects the file.
 _NEEDED = {"mass": ("value",), "limit": ("effort", "velocity")}
@@ -64,7 +67,51 @@ def urdf_faults(root: ET.Element) -> Iterator[str]:
         yield from _joint_faults(joint, names)
     for body in links:
         yield from _inertial_faults(body)
+    yield from _mimic_faults(joints)
+    for element in root:
+        if isinstance(element.tag, str) and element.tag.rpartition("}")[2] == "loop_joint":
+            yield from _loop_faults(element, names)
     yield from _tree_faults(names, joints)
+
+
+def _mimic_faults(joints: list[ET.Element]) -> Iterator[str]:
+    leaders = {
+        joint.get("name", ""): mimic.get("joint", "")
+        for joint in joints
+        if (mimic := joint.find("mimic")) is not None
+    }
+    names = {joint.get("name", "") for joint in joints}
+    for follower, leader in leaders.items():
+        if leader not in names:
+            yield f"joint {follower!r} mimics {leader!r}, which is not a joint of the file"
+    for follower in leaders:
+        chain = [follower]
+        while chain[-1] in leaders and leaders[chain[-1]] not in chain:
+            chain.append(leaders[chain[-1]])
+        if leaders.get(chain[-1]) == follower:
+            yield f"joint {follower!r} mimics itself" + (
+                f" through {', '.join(map(repr, chain[1:]))}" if chain[1:] else ""
+            )
+            return
+
+
+def _loop_faults(loop: ET.Element, links: list[str]) -> Iterator[str]:
+    where, ends = f"loop joint {loop.get('name', '')!r}", loop_ends(loop)
+    if len(ends) != 2:
+        yield f"{where} has {len(ends)} of <link1> and <link2>, not 2"
+    for end in ends:
+        if end.get("link") not in links:
+            yield f"the link {end.get('link')!r} of {where} does not exist"
+    yield from _wrong_numbers(loop, where)
+    axis = loop.find("axis")
+    numbers = read_numbers(axis.get("xyz", "1 0 0")) if axis is not None else ()
+    if numbers and not any(numbers):
+        yield f"the axis of {where} has no direction"
+
+
+def loop_ends(loop: ET.Element) -> list[ET.Element]:
+    """The two ends of a loop joint; some files call both of them ``link1``."""
+    return [end for end in loop if end.tag in ("link1", "link2")]
 
 
 def _joint_faults(joint: ET.Element, links: list[str]) -> Iterator[str]:

@@ -33,7 +33,7 @@ from copsense.files import load_configurations
         ("analyse icub --posture =3", "Give JOINT=POSITION"),
         ("analyse icub --joint l_knee=inf", "the position of joint 'l_knee' is inf"),
         ("analyse icub --joint l_nee=5", "Did you mean l_knee"),
-        ("analyse icub --base-yaw nan", "base_rpy (--base-yaw)"),
+        ("analyse icub --base-yaw nan", "base_rpy (--base-yaw, --base-rpy)"),
         ("analyse icub --along l_hip_rol", "Did you mean l_hip_roll"),
         ("analyse icub --contact l_soul", "Did you mean l_sole"),
         ("analyse icub --contact l_sole:surfce", "Did you mean surface"),
@@ -46,13 +46,37 @@ from copsense.files import load_configurations
         ("analyse four_bar --base-yaw 10", "lives in a plane"),
         ("analyse four_bar --com-x 0.1", "CoM's x remains"),
         ("analyse solo12 --sole 0:1:0:1", "every contact is a point"),
-        ("four-bar --xi nan", "xi must be a finite angle"),
+        ("four-bar --xi nan", "--xi is nan degrees. Give an angle over 0"),
+        ("four-bar --xi 180", "such as 85, 85deg or 1.5rad"),
         ("four-bar --xi 0", "collapsed"),
         ("four-bar --leg-mass -1", "leg_mass is -1.0. Give a positive"),
+        ("four-bar --xi=-0.1rad", "--xi is -5.72958 degrees"),
+        ("balance icub --reference sine:20deg:1", "Give hold, sine:AMPLITUDE"),
+        ("balance icub --reference sine:20mm:1s", "Give hold, sine:AMPLITUDE"),
+        ("balance icub --reference ramp:1:2:3", "Give hold, sine:AMPLITUDE"),
+        ("balance icub --push 0:40mm:0", "Give FX:FY:FZ"),
+        ("balance icub --unknown-payload chest=1m", "Give FRAME=KG"),
+        ("balance icub --torque-limit 20N", "Give Nm, model or JOINT=NM"),
+        ("analyse icub --limits cop-margin=5deg", "Write, say, cop-margin=0.005, 5mm or"),
+        ("analyse icub --limits torque=5N", "Write, say, torque=30Nm, torque=model or"),
+        ("benchmark icub --disturbance sway:amplitude=39deg", "Give a length, such as"),
+        ("benchmark icub --disturbance velocity_noise:severe=1m", "Give a rate, such as 1 (degree"),
         ("four-bar --leg-length nan", "leg_length is nan. Give a positive"),
         ("four-bar --criterion least-effort", "minimum-tangential"),
-        ("four-bar --criterion minimum-wrench --characteristic-length 0", "characteristic_length"),
-        ("four-bar --criterion weighted-torque --hip-weight 0", "hip_weight"),
+        (
+            "four-bar --criterion minimum-wrench --characteristic-length 0",
+            "characteristic-length is 0",
+        ),
+        ("four-bar --criterion weighted-torque --hip-weight 0", "hip-weight is 0"),
+        ("four-bar --characteristic-length 0", "--characteristic-length is 0"),
+        ("four-bar --hip-weight -1", "--hip-weight is -1"),
+        ("four-bar --ankle-weight nan", "--ankle-weight is nan"),
+        ("balance icub --gain com-stiffness=-3", "the gain com-stiffness is -3"),
+        ("balance icub --gain com-damping=nan", "the gain com-damping is nan"),
+        ("analyse icub --package-dir absent", "no folder 'absent' to look"),
+        ("design icub --com-y 0:1:1", "a path of 5 postures or more, this one has 1"),
+        ("reproduce --output absent/report", "Create it first"),
+        ("reproduce --output /proc/report", "cannot be written"),
         ("sweep icub", "say what to sweep"),
         ("sweep icub --com-y 0:1:3 --joint l_knee=0:1:2", "say what to sweep"),
         ("sweep icub --com-y 1:2", "Give START:STOP:COUNT"),
@@ -108,6 +132,9 @@ def test_an_empty_text_is_not_taken_for_an_option_left_out(arguments):
         "analyse icub --com-y left",
         "analyse icub --contact-at toe",
         "four-bar --xi upright",
+        "four-bar --leg-length 30deg",
+        "balance icub --delay 2mm",
+        "balance icub --velocity-noise 2deg",
         "reproduce --postures 3",
     ],
 )
@@ -173,7 +200,7 @@ def test_an_output_that_exists_is_kept_without_force(suffix, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
 
-def test_an_output_under_a_file_or_in_no_folder_is_refused_before_the_sweep(tmp_path, monkeypatch):
+def test_an_output_under_a_file_or_in_no_folder_is_rejected_before_the_sweep(tmp_path, monkeypatch):
     def never(*args, **kwargs):
         raise AssertionError("the sweep began")
 
@@ -226,3 +253,9 @@ def test_the_height_of_a_sole_is_along_the_contact_s_normal():
         for h in ("-0.08", "-0.07")
     )
     assert low - high == pytest.approx(0.01, abs=1e-9)
+
+
+def test_the_reason_of_a_bad_table_ends_in_one_full_stop(tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text("1,2\n3,x\n")
+    assert ".." not in copsense("sweep", "icub", "--configurations", path).error

@@ -9,7 +9,7 @@ from support.commands import copsense
     "criterion", ["minimum-wrench", "minimum-torque", "weighted-torque", "minimum-tangential"]
 )
 def test_four_bar_answers_in_json(criterion):
-    answer = copsense("four-bar", "--xi", "1.5", "--criterion", criterion, "--json").json
+    answer = copsense("four-bar", "--xi", "1.5rad", "--criterion", criterion, "--json").json
     assert list(answer["wrenches"]) == list(answer["sensitivity"]) == ["left", "right"]
     assert list(answer["torques"]) == ["hipL", "ankleL", "hipR", "ankleR"]
     assert list(answer["cop"]) == ["left", "right"]

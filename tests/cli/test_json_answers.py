@@ -12,6 +12,7 @@ from copsense.comparison import benchmark_summary, load_benchmark
 from copsense.controllers import BalancingController, Sine
 from copsense.design import Design, Family, Score, design_criterion
 from copsense.limits import Limits
+from copsense.maps import map_summary
 from copsense.regions import ComRegion, ComRegions
 from copsense.simulation import Scenario
 
@@ -132,3 +133,14 @@ def test_of_benchmark(tmp_path):
     assert told == as_json(benchmark_summary(load_benchmark(file)))
     assert told["cases"] == len({row["key"] for row in told["scores"]})
     assert all(isinstance(note, str) for note in notes)
+
+
+def test_of_map(stance_of, tmp_path):
+    store = tmp_path / "map.zarr"
+    told = command(
+        "map", "four_bar", "--over", "com_y=-10mm:10mm:3", "--output", store, "--json"
+    ).json
+    assert told == as_json(map_summary(store).to_dict()) | {
+        "plot": None,
+        "notes": list(stance_of("four_bar").robot.notes),
+    }

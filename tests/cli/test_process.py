@@ -12,8 +12,8 @@ import pytest
 
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
-    "robots", "analyse", "sweep", "plot", "map", "design", "balance", "benchmark", "four-bar",
-    "reproduce",
+    "robots", "inspect", "analyse", "sweep", "plot", "map", "push", "design", "balance",
+    "benchmark", "four-bar", "reproduce",
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",
@@ -79,7 +79,7 @@ def test_exit_codes_are_0_done_1_some_rows_failed_2_bad_input():
     assert (some.returncode, "failed: posture 1" in some.stderr) == (1, True)
     bad = run("analyse", "icub", "--com-y", "0.5")
     assert (bad.returncode, bad.stdout) == (2, "")
-    assert bad.stderr.startswith("error: no posture of 'icub'")
+    assert bad.stderr.splitlines()[-1].startswith("error: no posture of 'icub'")
     assert "Traceback" not in bad.stderr
 
 

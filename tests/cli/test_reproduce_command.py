@@ -4,7 +4,7 @@ from support.commands import copsense
 from support.reproductions import blank_pictures
 
 
-def test_a_reproduction_takes_limits_and_refuses_impossible_ones_at_once(tmp_path, monkeypatch):
+def test_a_reproduction_takes_limits_and_rejects_impossible_ones_at_once(tmp_path, monkeypatch):
     blank_pictures(monkeypatch)
     folder = tmp_path / "report"
     arguments = ("reproduce", "--static", "--postures", "21", "--output", folder, "--quiet")

@@ -280,7 +280,7 @@ def test_new_code_of_a_controller_is_another_parameter(tmp_path, monkeypatch):
         patched.setattr("copsense.comparison.benchmark_run.score_trial", lambda bench: 1 / 0)
         run_benchmark(plan([REST], [mine, C2]), table)
     # What failed is run again, and its code may be another by now.
-    module.write_text(OWN + "\n# mended")
+    module.write_text(OWN + "\n# fixed")
     first = run_benchmark(plan([REST], [mine, C2]), table)
     assert list(first["status"]) == ["measured"] * 4
     module.write_text(OWN + "\n# changed")

@@ -66,7 +66,7 @@ def test_ranks_are_taken_in_each_setting_and_averaged():
     assert found["mean_rank"].to_dict() == {"b": 1.0, "a": 1.5}
     assert found["wins"].to_dict() == {"b": 2, "a": 1}
     assert list(found.index) == ["b", "a"]  # the best first
-    # A setting in which a controller was not tried compares nobody.
+    # A setting in which a controller was not tried compares no one.
     alone = [*rows, row("b", 9.0, posture="r")]
     assert rank_controllers(pd.DataFrame(alone)).set_index("controller")["settings"]["b"] == 2
 

@@ -51,8 +51,8 @@ def projected_gravity(stance):
     return controller
 
 
-def assert_same(law, criterion, stance):
-    given = copsense.cop_sensitivity(stance, law)
+def assert_same(policy, criterion, stance):
+    given = copsense.cop_sensitivity(stance, policy)
     exact = copsense.cop_sensitivity(stance, criterion)
     for what in ("cop", "gradient", "wrench_derivative", "torque_derivative", "com_gain"):
         a, b = getattr(given, what), getattr(exact, what)
@@ -68,7 +68,9 @@ def assert_same(law, criterion, stance):
     [(wrench_controller, WRENCH), (torque_controller, TORQUE)],
     ids=["wrench", "torque"],
 )
-def test_a_law_that_does_what_a_criterion_asks_has_its_sensitivity(posture, controller, criterion):
+def test_a_policy_that_does_what_a_criterion_asks_has_its_sensitivity(
+    posture, controller, criterion
+):
     assert_same(controller(posture), criterion, posture)
 
 
@@ -79,8 +81,8 @@ def test_the_same_holds_on_tilted_planes(icub):
 
 def test_torques_alone_determine_wrenches_and_sensitivity(posture):
     # Torques that hold the robot up leave the two feet one way to push.
-    law = copsense.statics.wrench_policy(projected_gravity(posture), posture)
-    assert_same(law, TORQUE, posture)
+    policy = copsense.statics.wrench_policy(projected_gravity(posture), posture)
+    assert_same(policy, TORQUE, posture)
 
 
 def test_a_controllers_own_torques_give_back_its_wrenches(posture):
@@ -89,12 +91,12 @@ def test_a_controllers_own_torques_give_back_its_wrenches(posture):
         def torques(q, criterion=criterion):
             return copsense.solve_equilibrium(posture.at(q), criterion).torques
 
-        law = copsense.statics.wrench_policy(torques, posture)
+        policy = copsense.statics.wrench_policy(torques, posture)
         found = copsense.solve_equilibrium(posture, criterion)
-        np.testing.assert_allclose(law(posture.q), found.wrenches, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(policy(posture.q), found.wrenches, rtol=0, atol=1e-9)
 
 
-def test_a_law_that_does_not_balance_is_rejected(posture):
+def test_a_policy_that_does_not_balance_is_rejected(posture):
     with pytest.raises(copsense.CopsenseError, match="do not balance"):
         copsense.cop_sensitivity(posture, lambda q: 0.9 * wrench_controller(posture)(q))
 

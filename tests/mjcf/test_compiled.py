@@ -241,8 +241,6 @@ def test_a_model_that_is_not_mujocos_is_rejected(monkeypatch):
         ({"head": "<asset><mesh name='m' file='absent.stl'/></asset>"}, "absent.stl"),
         ({"head": "<include file='absent.xml'/>"}, "absent.xml"),
         ({"foot": "<wheel/>"}, "wheel"),
-        ({"head": "<option gravity='0 0 0'/>"}, "gravity"),
-        ({"head": "<option><flag gravity='disable'/></option>"}, "gravity"),
         ({"foot": ""}, "mass"),
     ],
 )
@@ -256,6 +254,20 @@ def test_what_mujoco_rejects_is_rejected_in_its_words(parts, said, tmp_path):
 def test_what_the_compiler_warns_of_is_a_note():
     robot = copsense.load_robot(walker(head="<compiler settotalmass='41'/>"))
     assert any("settotalmass" in note for note in robot.notes)
+
+
+@pytest.mark.parametrize(
+    "head", ["<option gravity='0 0 0'/>", "<option><flag gravity='disable'/></option>"]
+)
+def test_without_gravity_in_the_file_there_is_the_earths_and_a_note(head):
+    robot = copsense.load_robot(walker(head=head))
+    assert robot.model.gravity.linear.tolist() == [0, 0, -9.81]
+    assert any("turns gravity off" in note for note in robot.notes)
+
+
+def test_bodies_may_stand_in_frames_of_the_world():
+    text = walker().replace("<body name='trunk'", "<frame pos='0 0 1'><body name='trunk'")
+    assert_mujocos(text.replace("</worldbody>", "</frame></worldbody>"))
 
 
 def test_reading_leaves_no_file_behind(tmp_path, monkeypatch):

@@ -17,13 +17,13 @@ ACTUATORS = {
     "<motor joint='{j}' ctrlrange='-1 1'/><motor joint='{j}' gear='7' ctrlrange='-1 1'/>": 8.0,
     "<position joint='{j}' kp='100' ctrlrange='-1 1'/>": np.inf,
     "<motor joint='{j}'/>": np.inf,
-    "": np.inf,
 }
+OTHER = "<motor joint='r_knee'/>"
 
 
 @pytest.mark.parametrize(("actuators", "limit"), ACTUATORS.items(), ids=ACTUATORS)
 def test_an_effort_limit_is_the_largest_force_of_the_joints_actuators(actuators, limit):
-    text = walker(tail=f"<actuator>{actuators.format(j='l_knee')}</actuator>")
+    text = walker(tail=f"<actuator>{actuators.format(j='l_knee')}{OTHER}</actuator>")
     robot = copsense.load_robot(text)
     limits = dict(zip(robot.torque_names, robot.effort_limits, strict=True))
     assert limits.pop("l_knee") == limit

@@ -21,6 +21,13 @@ def no_mujoco(monkeypatch):
 
 SIMPLE = {
     "plain": {},
+    "a ball": {
+        "left": "<body name='arm'><joint name='ball' type='ball' pos='0 0 .1'/>"
+        "<geom type='capsule' fromto='0 0 0 .1 0 -.3' size='.03'/><site name='l_tip'/></body>"
+    },
+    "shapes of every group": {
+        "foot": "".join(f"<geom size='.0{3 + g}' group='{g}' pos='.{g} 0 0'/>" for g in range(6))
+    },
     "radians": {
         "head": "<compiler angle='radian'/>",
         "foot": FOOT + "<site name='{side}_tip' pos='.1 0 0' euler='.3 .2 .1'/>",
@@ -42,6 +49,10 @@ SIMPLE = {
     },
     "a keyframe": {
         "tail": "<keyframe><key name='k' qpos='0 0 1 1 0 0 0 .1 .2 .3 .4 .5 0 0 0 0 0'/></keyframe>"
+    },
+    "a keyframe of a base that is fixed": {
+        "base": "",
+        "tail": "<keyframe><key name='k' qpos='.1 .2 .3 .4 .5 0 0 0 0 0'/></keyframe>",
     },
     "a joint's place": {
         "left": LEG.format(side="l", y=0.1, foot="<geom size='.1'/>").replace(
@@ -79,6 +90,15 @@ MESH = "<asset><mesh name='cube' vertex='0 0 0 .1 0 0 0 .1 0 0 0 .1'/></asset>"
             {"before": "<body name='ball'><freejoint/><geom size='.1'/></body>"},
             "several bodies in the world (ball, trunk)",
         ),
+        (
+            {"foot": FOOT + "<geom size='.1' contype='0' conaffinity='0'/>"},
+            "a geom that does not collide and gives body 'l_foot' its mass",
+        ),
+        (
+            {"head": "<default><default class='seen'><geom contype='0'/></default></default>"},
+            "geoms of a class that do not collide",
+        ),
+        ({"left": "<body><joint name='j'/><geom size='.1'/></body>"}, "a body without a name"),
         ({"tail": "<worldbody/>"}, "2 <worldbody>"),
         (
             {"head": MESH, "foot": "<geom type='mesh' mesh='cube'/>"},
@@ -103,9 +123,8 @@ MESH = "<asset><mesh name='cube' vertex='0 0 0 .1 0 0 0 .1 0 0 0 .1'/></asset>"
                 "foot": FOOT + "<body name='{side}_a'><body name='{side}_b'><site name='{side}_s'/>"
                 "</body></body>"
             },
-            "a site in body 'l_b', which like its parent has no joint",
+            "a site in body 'l_b', which has no joint",
         ),
-        ({"head": "<option><flag gravity='disable'/></option>"}, "gravity that is disabled"),
         (
             {"head": "<extension><plugin plugin='mujoco.elasticity.cable'/></extension>"},
             "<extension>",
@@ -116,6 +135,18 @@ def test_what_the_reader_does_not_know_is_named_with_the_remedy(parts, said):
     with pytest.raises(ModelLoadError, match=r"pip install \"copsense\[sim\]\"") as caught:
         copsense.load_robot(walker(**parts))
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["<mujoco/>", "<mujoco><worldbody/></mujoco>"])
+def test_a_file_without_bodies_says_so(text):
+    with pytest.raises(ModelLoadError, match="no <body>"):
+        copsense.load_robot(text)
+
+
+def test_without_gravity_in_the_file_there_is_the_earths_and_a_note():
+    robot = copsense.load_robot(walker(head="<option><flag gravity='disable'/></option>"))
+    assert robot.model.gravity.linear.tolist() == [0, 0, -9.81]
+    assert any("turns gravity off" in note for note in robot.notes)
 
 
 def test_what_is_not_used_is_said():

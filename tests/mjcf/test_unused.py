@@ -6,21 +6,32 @@ from support.mjcf import FOOT, walker
 import copsense
 
 EQUALITIES = {
-    "connect": (
-        "<connect name='rod' body1='l_foot' body2='r_foot' anchor='0 0 0'/>",
-        "equality 'rod' (connect) of 'l_foot' and 'r_foot' is not used.",
+    "weld": (
+        "<weld body1='l_foot'/>",
+        "equality (weld) of 'l_foot' and the world is not used: it joins the robot to what is not "
+        "part of it.",
     ),
-    "weld": ("<weld body1='l_foot'/>", "equality (weld) of 'l_foot' and the world is not used."),
-    "joint": (
-        "<joint joint1='l_hip' joint2='r_hip'/>",
-        "equality (joint) of joint 'l_hip' and joint 'r_hip' is not used.",
+    "fixed": (
+        "<joint joint1='l_hip'/>",
+        "equality (joint) of joint 'l_hip' is not used: a joint that is held at a position is "
+        "taken to be held by its motor.",
     ),
-    "fixed": ("<joint joint1='l_hip'/>", "equality (joint) of joint 'l_hip' is not used."),
-    "sites": (
-        "<connect site1='l_tip' site2='r_tip'/>",
-        "equality (connect) of site 'l_tip' and site 'r_tip' is not used.",
+    "bent": (
+        "<joint joint1='l_hip' joint2='r_hip' polycoef='0 1 0 2 0'/>",
+        "equality (joint) of joint 'l_hip' and joint 'r_hip' is not used: its polynomial is of "
+        "degree 3, copsense knows straight lines.",
     ),
-    "tendon": ("<tendon tendon1='string'/>", "equality (tendon) of tendon 'string' is not used."),
+    "tendon": (
+        "<tendon name='taut' tendon1='string'/>",
+        "equality 'taut' (tendon) of tendon 'string' is not used: copsense knows connect, weld and "
+        "joint.",
+    ),
+}
+USED = {
+    "connect": "<connect name='rod' body1='l_foot' body2='r_foot' anchor='0 0 0'/>",
+    "weld": "<weld body1='l_foot' body2='r_foot'/>",
+    "sites": "<connect site1='l_tip' site2='r_tip'/>",
+    "joint": "<joint joint1='l_hip' joint2='r_hip'/>",
 }
 TENDON = "<tendon><fixed name='string'><joint joint='l_hip' coef='1'/></fixed></tendon>"
 TIPPED = FOOT + "<site name='{side}_tip'/>"
@@ -45,6 +56,11 @@ def test_an_equality_is_named_with_its_ends(element, said):
     assert notes(foot=TIPPED, tail=f"{TENDON}<equality>{element}</equality>") == (said,)
 
 
+@pytest.mark.parametrize("element", USED.values(), ids=USED)
+def test_an_equality_that_is_used_is_not_named(element):
+    assert notes(foot=TIPPED, tail=f"{TENDON}<equality>{element}</equality>") == ()
+
+
 def test_equalities_that_do_not_act_are_not_named():
     weld = "<equality><weld body1='l_foot' {}/></equality>"
     assert notes(tail=weld.format("active='false'")) == ()
@@ -59,18 +75,29 @@ def test_equalities_that_do_not_act_are_not_named():
     ("parts", "said"),
     [
         (
-            {"head": "<default><joint stiffness='3'/></default>"},
-            "springs (stiffness) of joints l_hip_roll, l_hip,",
+            {
+                "foot": "<geom size='.02' mass='.2'/><body><joint name='{side}_ball' type='ball' "
+                "stiffness='3'/>" + FOOT + "</body>"
+            },
+            "springs (stiffness) of joints l_ball, r_ball are not used",
         ),
         ({"tail": TENDON.replace("name=", "stiffness='9' name=")}, "tendons string are not used"),
         ({"tail": TENDON.replace("name=", "range='0 1' name=")}, "tendons string are not used"),
         (
-            {"tail": TENDON + "<actuator><motor name='winch' tendon='string'/></actuator>"},
-            "actuators winch do not act on a single joint",
+            {
+                "foot": TIPPED,
+                "tail": "<tendon><spatial name='rope'><site site='l_tip'/><site site='r_tip'/>"
+                "</spatial></tendon><actuator><motor name='winch' tendon='rope'/></actuator>",
+            },
+            "actuators winch do not act on a single joint or a fixed tendon; each joint that they",
+        ),
+        (
+            {"foot": TIPPED, "tail": "<actuator><motor name='jet' site='l_tip'/></actuator>"},
+            "actuators jet do not act on joints; they are not used",
         ),
         (
             {"tail": "<actuator><motor joint='l_hip'/></actuator>"},
-            "r_knee, r_ankle, r_ankle_roll have no actuator",
+            "r_knee, r_ankle, r_ankle_roll have no actuator, while others have; they have no motor",
         ),
         (
             {

@@ -595,7 +595,7 @@ def test_no_friction_on_flat_ground_does_no_harm(stance_of):
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-4, np.nan, FINEST / 2])
-def test_a_bad_tolerance_is_refused(grounded, tolerance):
+def test_a_bad_tolerance_is_rejected(grounded, tolerance):
     with pytest.raises(InvalidInputError, match="tolerance"):
         com_region(grounded("solo12")[0], Limits(), tolerance=tolerance)
 

@@ -53,7 +53,7 @@ def test_the_closed_loop_at_rest_has_the_static_wrenches(criterion):
 def test_one_foot_has_no_choice_and_stands(limits):
     stance = copsense.load_stance("icub", contacts=["l_sole"])
     controller = BalancingController(stance, C2, limits=limits)
-    # With limits the push is more than the sole can take at once: the rate gives way.
+    # With limits the push is more than the sole can take at once: the rate yields.
     push = Push((0.0, 5.0 if limits is None else 20.0, 0.0), 0.1, 0.1)
     recording = rollout(MujocoSimulator(stance), controller, Scenario(1.0, pushes=(push,)))
     assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]

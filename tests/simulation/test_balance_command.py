@@ -88,7 +88,7 @@ def test_a_users_controller_from_the_command(tmp_path, monkeypatch):
 
 def test_disturbances_from_the_command():
     answer = copsense(
-        "balance", "icub", "--duration", 0.3, "--payload", "l_hand=0.5", "--mass-error", 2,
+        "balance", "icub", "--duration", 0.3, "--unknown-payload", "l_hand=0.5", "--mass-error", 2,
         "--friction", "0.5:0.1:l_sole", "--force-noise", 0.5, "--moment-noise", 0.01,
         "--wrenches", "sensors", "--odometry", "loaded", "--gains", "public", "--json",
     )  # fmt: skip
@@ -197,7 +197,7 @@ def test_without_an_off_screen_the_remedy_is_named(tmp_path, monkeypatch):
         (["--output", "run.txt"], "suffix"),
         (["--friction", "ice"], "MU[:START[:CONTACT]]"),
         (["--friction", "0.1:0:wing"], "wing"),
-        (["--payload", "wing=1"], "wing"),
+        (["--unknown-payload", "wing=1"], "wing"),
         (["--mass-error", "-100"], "no mass would be left"),
         (["--odometry", "loaded"], "point contact"),
         (["--controller", "nowhere"], "MODULE:ATTRIBUTE"),
@@ -226,7 +226,7 @@ def test_gains_from_the_command_can_be_too_much():
         (["--gains", "stiff", "--controller", "a:b"], "belong to the built-in controller"),
         (["--control-period", 0.0015], "not a multiple of the physics' time step"),
         (["--control-period", 0], "control period"),
-        (["--payload", "chest"], "FRAME=KG"),
+        (["--unknown-payload", "chest"], "FRAME=KG"),
         (["--torque-limit", "l_knee"], "JOINT=NM"),
     ],
 )

@@ -262,11 +262,11 @@ def test_odometry_keeps_its_foot_while_another_carries_hardly_more():
 def test_odometry_is_off_by_what_the_foot_slips():
     import pinocchio as pin
 
-    stance, seen, law = icub(), [], BalancingController(icub(), C2)
+    stance, seen, balancing = icub(), [], BalancingController(icub(), C2)
 
     def controller(observation):
         seen.append(observation.q)
-        return law(observation)
+        return balancing(observation)
 
     scenario = Scenario(
         0.6,

@@ -51,7 +51,7 @@ def piped():
 
 
 def beside(observation):
-    """The child's law in this process."""
+    """The child's controller in this process."""
     torques = np.array(setup()["torques"])
     return hold(observation.q, observation.v, observation.target.posture, torques)
 

@@ -20,9 +20,9 @@ MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 def run(criterion, duration, *arguments, gains=None, wrenches=None, **options):
-    law = BalancingController(icub(), criterion, *([gains] if gains else []))
+    controller = BalancingController(icub(), criterion, *([gains] if gains else []))
     engine = MujocoSimulator(icub(), wrenches=wrenches) if wrenches else simulator()
-    return rollout(engine, law, Scenario(duration, *arguments, **options))
+    return rollout(engine, controller, Scenario(duration, *arguments, **options))
 
 
 STILL = {

@@ -73,3 +73,9 @@ def test_a_recording_is_a_table_and_a_picture(stood, fallen, tmp_path):
         assert len(repr(run).splitlines()) < 15
         assert "CoM y error" in run._repr_html_()
     assert "first tip" in repr(fallen)
+
+
+@pytest.mark.parametrize("bounds", [(5.0, 6.0), (0.1, 0.05), (np.nan, 1.0), (-2.0, -1.0)])
+def test_a_part_without_a_row_is_rejected_with_the_times_there_are(stood, bounds):
+    with pytest.raises(InvalidInputError, match=r"no row from .* it goes from 0"):
+        stood.between(*bounds)

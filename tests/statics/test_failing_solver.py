@@ -82,7 +82,7 @@ def test_wrong_rows_are_found_out(pressed, monkeypatch, how):
         assert {a.name for a in found.active} == {a.name for a in right.active}
 
 
-def test_nobody_left_to_ask_is_an_error_and_no_answer(pressed, monkeypatch):
+def test_no_solver_left_to_ask_is_an_error_and_no_answer(pressed, monkeypatch):
     def gives_up(*arguments, **settings):
         raise RuntimeError("Maximum number of iterations reached.")
 

@@ -35,7 +35,7 @@ def on(stance, **changes):
 
 
 def test_more_load_asked_than_the_robot_weighs(icub):
-    # Two feet that must carry 0.6 of the weight each: each has to give way by a tenth.
+    # Two feet that must carry 0.6 of the weight each: each has to be relaxed by a tenth.
     weight = icub.robot.weight
     with pytest.raises(InfeasibleError, match="normal force") as caught:
         solve(icub, replace(NO_LIMITS, normal_force=0.6 * weight))
@@ -51,7 +51,7 @@ def test_slope_steeper_than_its_friction(icub):
     with pytest.raises(InfeasibleError) as caught:
         solve(stance, Limits(cop_margin=None))
     assert all("slips" in name for name in caught.value.demands)
-    # m g sin spread over two feet against mu cos(pi/8) m g cos: each row gives way by half of it.
+    # m g sin spread over two feet against mu cos(pi/8) m g cos: each row is relaxed by half of it.
     least = max(
         np.cos(a) * np.sin(0.3) - 0.2 * np.cos(np.pi / 8) * np.cos(0.3)
         for a in np.pi / 8 * np.arange(1, 16, 2)
@@ -221,13 +221,13 @@ def test_criterion_that_needs_a_tie_break(icub):
         solve(icub, Limits(), copsense.minimum_tangential(WRENCH))
 
 
-def test_law_with_limits_is_refused(icub):
+def test_policy_with_limits_is_rejected(icub):
     wrenches = copsense.solve_equilibrium(icub, WRENCH).wrenches
     with pytest.raises(InvalidInputError, match="limits apply to a Criterion"):
         solve(icub, Limits(), lambda q: wrenches)
 
 
-def test_inertia_weight_with_massless_feet_is_refused(stance_of):
+def test_inertia_weight_with_massless_feet_is_rejected(stance_of):
     with pytest.raises(InvalidInputError, match="every joint to move some mass"):
         solve(stance_of("four_bar"), Limits(), copsense.weighted_torque("inverse inertia"))
 
@@ -276,7 +276,7 @@ def test_pyramid_without_sides(sides):
 
 
 def test_unknown_names(icub):
-    # The annotations refuse these too while the suite runs: looked at without them.
+    # The annotations reject these too while the suite runs: looked at without them.
     for name, value in (
         ("torsion", "Cone"),
         ("friction", "cone"),

@@ -22,7 +22,7 @@ class Answer:
     @property
     def json(self):
         """The answer as JSON, which has no NaN and no infinity."""
-        return json.loads(self.out, parse_constant=_refuse)
+        return json.loads(self.out, parse_constant=_reject)
 
     @property
     def error(self):
@@ -53,5 +53,5 @@ def copsense(*arguments):
     return Answer(code, out.getvalue(), err.getvalue())
 
 
-def _refuse(constant):
+def _reject(constant):
     raise AssertionError(f"{constant} is no JSON")

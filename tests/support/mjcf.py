@@ -51,11 +51,12 @@ def assert_mujocos(source, robot=None, root="trunk"):
     """Mass, CoM, every body, site, joint axis and range of a robot are those MuJoCo compiles."""
     robot = copsense.load_robot(source) if robot is None else robot
     text = isinstance(source, str) and source.lstrip().startswith("<")
-    mj = (
-        mujoco.MjModel.from_xml_string(source)
-        if text
-        else mujoco.MjModel.from_xml_path(str(source))
-    )
+    compiled = mujoco.MjModel.from_xml_string if text else mujoco.MjModel.from_xml_path
+    mujoco.set_mju_user_warning(lambda _: None)  # else it writes a log file here
+    try:
+        mj = compiled(str(source))
+    finally:
+        mujoco.set_mju_user_warning(None)
     data, body = mujoco.MjData(mj), mj.body(root).id
     inside = [b for b in range(mj.nbody) if mj.body_rootid[b] == body]
     assert abs(robot.mass - mj.body_subtreemass[body]) < 1e-9

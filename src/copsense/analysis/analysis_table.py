@@ -25,6 +25,7 @@ _COLUMNS = (
     "over edge",
     "unloads",
 )
+_POINT_COLUMNS = ("contact", "load", "dload/dCoM x, y [1/m]", "CoM travel [mm]: unloads")
 _TO_THE_LEFT = ("contact", "margin [mm]")  # words; numbers are aligned to the right
 
 
@@ -96,6 +97,13 @@ def _heading(data: dict[str, Any]) -> Iterator[str]:
     yield (
         f"{count} contact{'s' * (count != 1)}, {motions} admissible motion{'s' * (motions != 1)}"
     )
+    margin = data["support_margin"]
+    if margin is not None:
+        where = "inside" if margin >= 0 else "outside"
+        yield (
+            f"the centre of pressure of the whole robot is {abs(margin) * 1e3:.1f} mm {where} the "
+            "support polygon"
+        )
 
 
 def _title(name: str, row: dict[str, Any]) -> str:
@@ -105,6 +113,8 @@ def _title(name: str, row: dict[str, Any]) -> str:
 def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[str]]]:
     """Headings, and a line of words per contact."""
     contacts = row["contacts"]
+    if all(c["kind"] == "point" for c in contacts.values()):
+        return _point_cells(row)
     along = [
         key for key in next(iter(contacts.values())) if key.startswith("cop_per_")
     ]  # one at most
@@ -132,6 +142,25 @@ def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[
             ]
         )
     return columns + [""] * pulls, lines
+
+
+def _point_cells(row: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+    """The same where every contact is a point: how the load moves, and when one carries none."""
+    contacts = row["contacts"]
+    pulls = any(c["pulling"] for c in contacts.values())
+    lines = []
+    for name, c in contacts.items():
+        x, y = (round(float(gain), 4) + 0.0 for gain in c["load_gain"])
+        lines.append(
+            [
+                name,
+                f"{c['load_share']:.3f}",
+                f"{x:+.3f}, {y:+.3f}",
+                _travel(c["unloading_travel"], row),
+                *(["PULLING" if c["pulling"] else ""] if pulls else []),
+            ]
+        )
+    return [*_POINT_COLUMNS] + [""] * pulls, lines
 
 
 def _travel(travel: float, row: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
@@ -22,7 +23,7 @@ from copsense.travel import Travel
 SIDES = {"+y": 1, "-y": -1}  # to which the CoM may go, world axes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LimitAnalysis:
     """A criterion within limits at one posture.
 
@@ -42,6 +43,17 @@ class LimitAnalysis:
     margins: tuple[LimitMargin, ...]
     next_changes: Mapping[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]
     travels: Mapping[str, Travel]
+
+    def __post_init__(self) -> None:
+        """Own the mappings."""
+        freeze(self, "next_changes", "travels")
+
+    def __repr__(self) -> str:
+        """The active limits, and the first that is met to either side."""
+        active = ", ".join(limit.name for limit in self.active[:4]) or "none"
+        more = f" and {len(self.active) - 4} more" if len(self.active) > 4 else ""
+        ways = "".join(f"; CoM to {side}: {met!r}" for side, met in self.travels.items())
+        return f"LimitAnalysis(active limits: {active}{more}{ways})"
 
     @property
     def pressed(self) -> bool:

@@ -13,14 +13,16 @@ from jaxtyping import Float
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
-from copsense.cop import total_center_of_pressure
+from copsense.content import freeze
+from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.freedom import freedom_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
-from copsense.robots import sole_notes
+from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance
 from copsense.statics import (
@@ -63,6 +65,10 @@ class Analysis:
     along: str | None
     notes: tuple[str, ...]
     checked: bool
+
+    def __post_init__(self) -> None:
+        """Own the tangent and the mappings."""
+        freeze(self, "tangent", "sensitivities", "limit_analyses")
 
     @property
     def equilibria(self) -> dict[str, StaticEquilibrium]:
@@ -127,10 +133,20 @@ class Analysis:
                 {"name": c.name, "frame": c.frame, "kind": c.kind, "position": p.translation}
                 for c, p in zip(stance.contacts, stance.placements, strict=True)
             ],
+            "support_margin": self._support_margin,
             "criteria": {name: self._criterion(name) for name in self.sensitivities},
         }
         data["verdict"] = verdict(data)
         return data | {"notes": list(self.notes), "checked": self.checked}
+
+    @property
+    def _support_margin(self) -> float | None:
+        """How far the whole robot's centre of pressure is inside the support polygon [m]."""
+        outline = support_polygon(self.stance)
+        if outline is None or len(outline) < 2:
+            return None
+        at = total_center_of_pressure(next(iter(self.equilibria.values())))[:2]
+        return float(outline.margins(at)) if len(outline) > 2 else -outline.boundary_distance(at)
 
     def _criterion(self, name: str) -> dict[str, Any]:
         found = self.sensitivities[name]
@@ -153,6 +169,7 @@ class Analysis:
         for k, contact in enumerate(self.stance.contacts):
             edge = int(found.tipping_edge[k])
             row: dict[str, Any] = {
+                "kind": contact.kind,
                 "wrench": equilibrium.wrenches[k],
                 "load_share": float(equilibrium.wrenches[k, 2]) / self.stance.robot.weight,
                 "pulling": contact.name in equilibrium.pulling,
@@ -160,6 +177,7 @@ class Analysis:
                 "cop_slope": slope[k],
                 "cop_gain": found.com_gain[k],
                 "worst_case_gain": float(found.worst_case_gain[k]),
+                "load_gain": found.load_gain[k],
                 "com_travel": float(found.com_travel[k]),
                 "tipping_edge": None if edge < 0 else edge,
                 "unloading_travel": float(found.unloading_travel[k]),
@@ -239,6 +257,8 @@ def analyse(
         *here.robot.notes,
         *tied,
         *_limit_notes(here, within, limited),
+        *freedom_notes(here),
+        *plausibility_notes(here),
         *sole_notes(here),
         *joint_limit_notes(here),
     )

@@ -40,6 +40,8 @@ class Lanes(types.Type):  # type: ignore[misc]
 
 @register_model(Lanes)
 class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    """How lanes lie in memory: one vector."""
+
     def __init__(self, dmm: Any, fe_type: Any) -> None:
         super().__init__(dmm, fe_type, _VECTOR)
 
@@ -80,6 +82,8 @@ def _define(operation: Any, instruction: str) -> None:
 
     @infer_global(operation)
     class Template(AbstractTemplate):  # type: ignore[misc]
+        """The operation's type: lanes."""
+
         def generic(self, args: Any, kws: Any) -> Any:
             if len(args) != 2 or not any(isinstance(a, Lanes) for a in args):
                 return None
@@ -103,6 +107,8 @@ _define(operator.truediv, "fdiv")
 
 @infer_global(operator.neg)
 class _Negative(AbstractTemplate):  # type: ignore[misc]
+    """The type of minus lanes: lanes."""
+
     def generic(self, args: Any, kws: Any) -> Any:
         return signature(LANES, *args) if isinstance(args[0], Lanes) else None
 

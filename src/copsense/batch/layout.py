@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from copsense.content import ShortRepr
 from copsense.robot import Robot
 from copsense.stance import Stance
 
@@ -95,8 +96,8 @@ class Feet(NamedTuple):
     weight: float
 
 
-@dataclass(frozen=True, eq=False)
-class RobotLayout:
+@dataclass(frozen=True, eq=False, repr=False)
+class RobotLayout(ShortRepr):
     """What a kernel needs to know of a robot and its contacts."""
 
     tree: Tree

@@ -21,6 +21,7 @@ _COMMANDS = {
     name: Place(f"copsense.cli.{name.replace('-', '_')}_command", function, summary)
     for name, function, summary in (
         ("robots", "robots", "List the robots known by name."),
+        ("inspect", "inspect", "Inspect a robot: joints, motors, feet, and how it stands."),
         ("analyse", "analyse", "Analyse one posture: CoP, margin and sensitivity of each contact."),
         ("sweep", "sweep", "Sweep the CoM or a joint and evaluate every posture."),
         ("plot", "plot", "Draw a sweep that `copsense sweep` wrote."),

@@ -11,6 +11,7 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
+from copsense.cli.stance_memory import written
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import LENGTH, read_positions
 from copsense.errors import InvalidInputError
@@ -86,6 +87,8 @@ def analyse(
             "--limits friction=0.33,torque=model."
         )
     chosen = read_criteria(criteria, characteristic_length)
+    # The posture that is analysed is the one to write down, not the one it started from.
+    kept, anew = options.pop("save_stance"), options.pop("force_stance")
     home = read_stance(robot, **options)
     analysis = analyse_stance(
         home,
@@ -97,6 +100,7 @@ def analyse(
         joints=read_positions(joints, home.robot),
         check=check,
     )
+    written(analysis.stance, kept, robot, anew, options["package_dirs"])
     answer = analysis.to_dict()
     if regions is not None:
         assert within is not None

@@ -27,6 +27,7 @@ from copsense.cli.disturbance_options import (
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -52,15 +53,15 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     help=f"How far to the left the CoM goes: {REFERENCES}.",
 )
 @click.option(
-    "--duration", type=float, metavar="S", help="Default: one period, the ramp and 1 s, or 2 s."
+    "--duration", type=TIME, metavar="TIME", help="Default: one period, the ramp and 1 s, or 2 s."
 )
 @controller_options
 @click.option(
     "--control-period",
-    type=float,
+    type=TIME,
     default=1e-3,
     show_default=True,
-    metavar="S",
+    metavar="TIME",
     help="Time between two steps of the controller [s], a multiple of the physics' 1 ms.",
 )
 @click.option(

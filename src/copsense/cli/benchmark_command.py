@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import click
 
@@ -53,7 +53,7 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     multiple=True,
     metavar="TRIAL[:OPTION=VALUE,...]",
     help=f"What the robot is put through: {_TRIALS}. Repeatable; default lean, push and sway. "
-    "Example: sway:amplitude=0.039,frequency=0.05.",
+    "Example: sway:amplitude=39mm,frequency=0.05.",
 )
 @click.option(
     "--limits",
@@ -249,7 +249,7 @@ def _trials(
     texts: Sequence[str], repeats: int | None, seed: int | None, quick: bool
 ) -> dict[str, Trial]:
     from copsense.comparison import Breaking, Falls, Lean, PushToTip, Sway
-    from copsense.comparison.trials import trial_named
+    from copsense.comparison.trials import option_unit, trial_named
 
     found: dict[str, Trial] = {}
     for text in texts:
@@ -262,7 +262,10 @@ def _trials(
                     f"the disturbance {text!r} is not understood. Give TRIAL[:OPTION=VALUE,...], "
                     "such as lean:speed=0.01,side=right."
                 )
-            options[name] = _number_or_word(value)
+            unit = option_unit(kind, name)
+            options[name] = (
+                _number_or_word(value) if unit is None else read_quantity(value, cast(Unit, unit))
+            )
         if kind == "falls":
             options |= {"repeats": repeats} if repeats is not None else {}
             options |= {"seed": seed} if seed is not None else {}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import LENGTH
 
 if TYPE_CHECKING:
@@ -49,5 +50,8 @@ def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[
     """The criteria named, or the paper's two."""
     from copsense.criterion import criterion_named
 
+    file = remembered_stance()
+    if not names and file is not None and file.criteria:
+        return list(file.criteria)
     chosen = dict.fromkeys(names or ("minimum-wrench", "minimum-torque"))
     return [criterion_named(name, characteristic_length) for name in chosen]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.units import read_assignments
+from copsense.cli.units import TIME, Quantity, Unit, read_assignments, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from copsense.simulation import FrictionChange, Push
 
 
-REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m/s]"
+REFERENCES = "hold, sine:AMPLITUDE:FREQUENCY or ramp:DISTANCE[:SPEED] [m, Hz, m/s, or as 20mm]"
 
 
 def disturbance_options(command: F) -> F:
@@ -34,7 +34,7 @@ def disturbance_options(command: F) -> F:
             help="The ground's friction from START [s] on, under one contact or all. Repeatable.",
         ),
         click.option(
-            "--payload",
+            "--unknown-payload",
             multiple=True,
             metavar="FRAME=KG",
             help="A mass on the robot that the controller does not know of. Repeatable.",
@@ -47,10 +47,10 @@ def disturbance_options(command: F) -> F:
             help="Every link is heavier by this than the controller believes.",
         ),
         click.option(
-            "--delay", type=float, default=0.0, metavar="S", help="Delay of the torques [s]."
+            "--delay", type=TIME, default=0.0, metavar="TIME", help="Delay of the torques [s]."
         ),
         click.option(
-            "--bandwidth", type=float, metavar="HZ", help="Bandwidth of the torques [Hz]."
+            "--bandwidth", type=Quantity("Hz"), metavar="HZ", help="Bandwidth of the torques [Hz]."
         ),
         click.option(
             "--torque-limit",
@@ -60,28 +60,28 @@ def disturbance_options(command: F) -> F:
         ),
         click.option(
             "--position-noise",
-            type=float,
+            type=Quantity("rad"),
             default=0.0,
-            metavar="RAD",
-            help="Noise of the joint positions.",
+            metavar="ANGLE",
+            help="Noise of the joint positions; 0.001rad is 1 mm on a prismatic joint.",
         ),
         click.option(
             "--velocity-noise",
-            type=float,
+            type=Quantity("rad/s"),
             default=0.0,
-            metavar="RAD/S",
-            help="Noise of the joint velocities.",
+            metavar="RATE",
+            help="Noise of the joint velocities, such as 1deg/s; likewise.",
         ),
         click.option(
             "--force-noise",
-            type=float,
+            type=Quantity("N"),
             default=0.0,
             metavar="N",
             help="Noise of the measured forces.",
         ),
         click.option(
             "--moment-noise",
-            type=float,
+            type=Quantity("Nm"),
             default=0.0,
             metavar="NM",
             help="Noise of the measured moments.",
@@ -109,7 +109,7 @@ def read_disturbances(options: dict[str, Any]) -> dict[str, Any]:
         "friction": tuple(_read_friction(text) for text in take("friction")),
         "model_error": ModelError(
             take("mass_error") / 100.0,
-            read_assignments(take("payload"), "FRAME=KG, such as chest=1"),
+            read_assignments(take("unknown_payload"), "FRAME=KG, such as chest=1", "kg"),
         ),
         "motors": Motors(
             take("delay"), take("bandwidth"), _read_torque_limits(take("torque_limit"))
@@ -129,17 +129,19 @@ def read_signal(text: str) -> Signal:
     kind, _, rest = text.partition(":")
     if kind not in ("hold", "sine", "ramp"):
         raise UnknownNameError("reference", kind, ("hold", "sine", "ramp"))
+    parts = rest.split(":") if rest else []
     try:
-        numbers = [float(part) for part in rest.split(":")] if rest else []
+        units: tuple[Unit, Unit] = ("m", "Hz" if kind == "sine" else "m/s")
+        numbers = [read_quantity(part, unit) for part, unit in zip(parts, units, strict=False)]
+    except InvalidInputError:
+        numbers = []
+    if len(numbers) == len(parts):
         if kind == "hold" and not numbers:
             return Hold()
         if kind == "sine" and len(numbers) == 2:
             return Sine(*numbers)
         if kind == "ramp" and len(numbers) in (1, 2):
             return Ramp(*numbers)
-    except ValueError as error:
-        if isinstance(error, InvalidInputError):
-            raise
     raise InvalidInputError(f"the reference {text!r} is not understood. Give {REFERENCES}.")
 
 
@@ -148,12 +150,12 @@ def _read_push(text: str) -> Push:
 
     try:
         x, y, z, *rest = text.split(":")
-        force = float(x), float(y), float(z)
+        force = read_quantity(x, "N"), read_quantity(y, "N"), read_quantity(z, "N")
         extra: dict[str, Any] = {}
         if rest:
-            extra["start"] = float(rest[0])
+            extra["start"] = read_quantity(rest[0], "s")
         if len(rest) > 1:
-            extra["duration"] = float(rest[1])
+            extra["duration"] = read_quantity(rest[1], "s")
         if len(rest) > 2:
             extra["frame"] = ":".join(rest[2:])
     except ValueError:
@@ -170,13 +172,12 @@ def _read_friction(text: str) -> FrictionChange:
     friction, _, rest = text.partition(":")
     start, _, contact = rest.partition(":")
     try:
-        return FrictionChange(float(friction), float(start or 0.0), contact or None)
-    except ValueError as error:
-        if isinstance(error, InvalidInputError):
-            raise
+        coefficient, since = float(friction), read_quantity(start or "0", "s")
+    except ValueError:
         raise InvalidInputError(
             f"the friction {text!r} is not understood. Give MU[:START[:CONTACT]], such as 0.1:1.0."
         ) from None
+    return FrictionChange(coefficient, since, contact or None)
 
 
 def _read_torque_limits(texts: tuple[str, ...]) -> Any:
@@ -185,9 +186,9 @@ def _read_torque_limits(texts: tuple[str, ...]) -> Any:
         if texts[0] == "model":
             return "model"
         try:
-            return float(texts[0])
+            return read_quantity(texts[0], "Nm")
         except ValueError:
             raise InvalidInputError(
                 f"the torque limit {texts[0]!r} is not understood. Give Nm, model or JOINT=NM."
             ) from None
-    return read_assignments(texts, "NM, model or JOINT=NM, such as l_knee=20") or None
+    return read_assignments(texts, "NM, model or JOINT=NM, such as l_knee=20", "Nm") or None

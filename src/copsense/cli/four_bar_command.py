@@ -7,25 +7,38 @@ from typing import Any
 
 import click
 
+from copsense.arrays import finite_number
 from copsense.cli.printing import echo_json
+from copsense.cli.units import ANGLE, LENGTH, Quantity
 from copsense.errors import InvalidInputError, UnknownNameError
+
+MASS = Quantity("kg")
 
 
 @click.command(
     "four-bar",
     epilog="Example: copsense four-bar --leg-length 0.5 --rod-length 0.14 --leg-mass 8.25 "
-    "--body-mass 16.5 --xi 1.5 --criterion minimum-torque --json",
+    "--body-mass 16.5 --xi 86deg --criterion minimum-torque --json",
 )
-@click.option("--leg-length", type=float, default=0.5, show_default=True, help="l [m].")
-@click.option("--rod-length", type=float, default=0.14, show_default=True, help="d [m].")
-@click.option("--leg-mass", type=float, default=8.25, show_default=True, help="m_l [kg].")
-@click.option("--body-mass", type=float, default=16.5, show_default=True, help="m_b [kg].")
+@click.option(
+    "--leg-length", type=LENGTH, default=0.5, show_default=True, metavar="LENGTH", help="l [m]."
+)
+@click.option(
+    "--rod-length", type=LENGTH, default=0.14, show_default=True, metavar="LENGTH", help="d [m]."
+)
+@click.option(
+    "--leg-mass", type=MASS, default=8.25, show_default=True, metavar="KG", help="m_l [kg]."
+)
+@click.option(
+    "--body-mass", type=MASS, default=16.5, show_default=True, metavar="KG", help="m_b [kg]."
+)
 @click.option(
     "--xi",
-    type=float,
+    type=ANGLE,
     default=math.pi / 2,
-    show_default="pi/2",
-    help="Angle between rod and leg [rad]; pi/2 stands upright.",
+    show_default="90",
+    metavar="ANGLE",
+    help="Angle between rod and leg, over 0 and under 180 degrees; 90 stands upright.",
 )
 @click.option(
     "--criterion",
@@ -36,10 +49,10 @@ from copsense.errors import InvalidInputError, UnknownNameError
 )
 @click.option(
     "--characteristic-length",
-    type=float,
+    type=LENGTH,
     default=1.0,
     show_default=True,
-    metavar="M",
+    metavar="LENGTH",
     help="L [m] of minimum-wrench and minimum-tangential.",
 )
 @click.option(
@@ -66,22 +79,19 @@ def four_bar(
 
     if criterion not in FOUR_BAR_CRITERIA:
         raise UnknownNameError("criterion of the four-bar", criterion, FOUR_BAR_CRITERIA)
-    if not math.isfinite(xi):
-        raise InvalidInputError(f"xi must be a finite angle [rad], got {xi}.")
+    if not 0.0 < xi < math.pi:
+        raise InvalidInputError(
+            f"--xi is {math.degrees(xi):g} degrees. Give an angle over 0 and under 180 degrees, at "
+            "which the linkage is collapsed, such as 85, 85deg or 1.5rad; 90 stands upright."
+        )
+    for name, value in parameters.items():  # also of those that this criterion does not use
+        finite_number(value, f"--{name.replace('_', '-')}", positive=True)
     own = {k: v for k, v in parameters.items() if k in FOUR_BAR_CRITERIA[criterion].defaults}
     linkage = FourBar(leg_length, rod_length, leg_mass, body_mass)
     solution = solve_four_bar(linkage, xi, criterion, **own)
     sides = ("left", "right")
     answer: dict[str, Any] = {
-        "wrenches": dict(zip(sides, solution.wrenches, strict=True)),
-        "torques": dict(
-            zip(("hipL", "ankleL", "hipR", "ankleR"), solution.torques.tolist(), strict=True)
-        ),
-        "cop": dict(zip(sides, solution.cop.tolist(), strict=True)),
-        "sensitivity": dict(zip(sides, solution.sensitivity.tolist(), strict=True)),
-        "cop_per_com": dict(zip(sides, solution.cop_per_com.tolist(), strict=True)),
-        "com": solution.com,
-        "load_transfer_share": solution.share,
+        **solution.to_dict(),
         "criterion": criterion,
         "parameters": {
             "leg_length": leg_length,
@@ -96,7 +106,8 @@ def four_bar(
         echo_json(answer)
         return
     click.echo(
-        f"{criterion} at xi = {xi:.6g} rad, CoM at ({solution.com[0]:.4f}, {solution.com[1]:.4f}) m"
+        f"{criterion} at xi = {math.degrees(xi):.6g} deg, "
+        f"CoM at ({solution.com[0]:.4f}, {solution.com[1]:.4f}) m"
     )
     click.echo("from the left foot (x right, y up)\n")
     click.echo("foot    fx [N]      fy [N]      mz [N m]    CoP [mm]   dCoP/dxi [m/rad]  dCoP/dCoM")

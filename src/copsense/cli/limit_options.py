@@ -7,10 +7,28 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.option_lists import F
+from copsense.cli.stance_memory import remembered_stance
+from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.limits import Limits
+
+# What a number means; it may be written with its unit.
+_UNITS: dict[str, Unit] = {
+    "normal-force": "N",
+    "cop-margin": "m",
+    "torsion": "m",
+    "torque": "Nm",
+}
+# Of each limit that can be switched off, what may be written.
+_EXAMPLES = {
+    "normal-force": "5, 5N",
+    "friction": "0.33",
+    "cop-margin": "0.005, 5mm",
+    "torsion": "0.02, 20mm",
+    "torque": "30Nm, torque=model",
+}
 
 
 def limits_option(command: F) -> F:
@@ -30,7 +48,8 @@ def read_limits(text: str | None) -> Limits | None:
     from copsense.limits import Limits
 
     if text is None:
-        return None
+        file = remembered_stance()
+        return None if file is None else file.limits
     names = {
         "normal-force": "normal_force",
         "friction": "friction",
@@ -65,8 +84,15 @@ def _limit_value(name: str, value: str) -> float | int | str | None:
     }.get(name, ()):
         return value
     try:
-        return int(value) if name == "sides" else float(value)
+        if name == "sides":
+            return int(value)
+        unit = _UNITS.get(name)
+        return float(value) if unit is None else read_quantity(value, unit)
     except ValueError:
+        if name == "sides":
+            remedy = "Write a whole number from 3, such as sides=8"
+        else:
+            remedy = f"Write, say, {name}={_EXAMPLES[name]} or {name}=off"
         raise InvalidInputError(
-            f"the limit {name}={value!r} is not a number. Write, say, {name}=8 or {name}=off."
+            f"the limit {name}={value!r} is not understood. {remedy}."
         ) from None

@@ -49,7 +49,7 @@ def put_loads(stance: Stance, loads: tuple[str, ...], payloads: tuple[str, ...])
     for text in payloads:
         frame, mass = _assigned(text, _PAYLOAD)
         try:
-            kilograms = float(mass.removesuffix("kg"))
+            kilograms = read_quantity(mass, "kg")
         except ValueError:
             raise InvalidInputError(
                 f"--payload {text!r} is not understood. Give {_PAYLOAD}."
@@ -79,7 +79,8 @@ def _read_load(text: str) -> Load:
 
     frame, numbers = _assigned(text, _LOAD)
     try:
-        values = [float(number) for number in numbers.split(":")]
+        parts = numbers.split(":")
+        values = [read_quantity(part, "N" if i < 3 else "Nm") for i, part in enumerate(parts)]
     except ValueError:
         values = []
     if len(values) not in (3, 6):

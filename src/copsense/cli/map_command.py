@@ -166,7 +166,7 @@ def map_command(
     if plot is not None:
         _draw(stance, summary, plot, pair, marginal, force)
     if as_json:
-        echo_json(_as_json(summary, plot) | {"notes": list(stance.robot.notes)})
+        echo_json(summary.to_dict() | {"plot": plot, "notes": list(stance.robot.notes)})
     else:
         _print(summary, plot)
     click.get_current_context().exit(1 if _failures(summary) else 0)
@@ -252,29 +252,6 @@ def _draw(
 def _failures(summary: MapSummary) -> int:
     kinds = ("unreachable", "rejected", "unsolved")
     return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
-
-
-def _as_json(summary: MapSummary, plot: str | None) -> dict[str, Any]:
-    return {
-        "robot": summary.robot,
-        "output": summary.path,
-        "plot": plot,
-        "coordinates": dict(zip(summary.coordinates, summary.units, strict=True)),
-        "postures": summary.postures,
-        "complete": summary.complete,
-        "criteria": {
-            name: {
-                "counts": row.counts,
-                "share": {k: n / summary.postures for k, n in row.counts.items()},
-                "worst_travel": [vars(w) for w in row.worst_travel],
-                "worst_gain": [vars(w) for w in row.worst_gain],
-                "travel_percentiles": row.travel_percentiles,
-                "gain_percentiles": row.gain_percentiles,
-                "failed": {status: vars(first) for status, first in row.failed.items()},
-            }
-            for name, row in summary.criteria.items()
-        },
-    }
 
 
 def _print(summary: MapSummary, plot: str | None) -> None:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
+from copsense.cli.stance_memory import remember_stance, remembered_stance, written
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -23,7 +25,24 @@ if TYPE_CHECKING:
 def stance_options(command: F) -> F:
     """The robot, how it stands, and what it must respect."""
     options = [
-        click.argument("robot"),
+        click.argument("robot", required=False, default=""),
+        click.option(
+            "--stance",
+            "stance_file",
+            metavar="FILE",
+            expose_value=False,
+            is_eager=True,
+            callback=remember_stance,
+            help="A stance file (.toml) instead of ROBOT: robot, contacts, configuration, loads "
+            "and drives, and the limits and criteria to use unless options give others.",
+        ),
+        click.option(
+            "--save-stance",
+            metavar="FILE",
+            help="Write the stance down, with the limits and criteria, for --stance and "
+            "copsense.load_stance.",
+        ),
+        click.option("--force-stance", is_flag=True, help="Overwrite that file."),
         click.option(
             "--contact",
             "contacts",
@@ -37,6 +56,13 @@ def stance_options(command: F) -> F:
             type=click.Choice(["frame", "sole"]),
             help="Put surface contacts at the model's frame, or at the sole's bottom as the "
             "collision geometry shows it.",
+        ),
+        click.option(
+            "--soles",
+            type=click.Choice(["collision", "visual"]),
+            default="collision",
+            help="Geometry that soles are read from: what collides (default), or what is drawn, "
+            "for a URDF without collision geometry.",
         ),
         click.option(
             "--sole",
@@ -73,8 +99,15 @@ def stance_options(command: F) -> F:
             "preset has its own.",
         ),
         click.option(
+            "--base-rpy",
+            metavar="ROLL:PITCH:YAW",
+            help="Orientation of the base to start from (degrees, or with units), where its z axis "
+            "is not up; instead of --base-yaw.",
+        ),
+        click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
+        drive_options,
         load_options,
         limits_option,
     ]
@@ -85,22 +118,45 @@ def read_stance(
     robot: str,
     contacts: tuple[str, ...],
     contact_at: Any,
+    soles: Any,
     sole: str | None,
     sole_height: float | None,
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
+    base_rpy: str | None,
     width: float | None,
     loads: tuple[str, ...] = (),
     payloads: tuple[str, ...] = (),
+    save_stance: str | None = None,
+    force_stance: bool = False,
+    **drives: tuple[str, ...],
 ) -> Stance:
     """The stance that the options of `stance_options` describe; lengths [m], angles [rad].
 
     The robot's notes are printed.
     """
+    from copsense.description import check_package_dirs
     from copsense.robot import Robot
-    from copsense.robots import PRESETS, load_robot, load_stance
+    from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
+    file = remembered_stance()
+    if file is not None:
+        placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
+        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
+            raise InvalidInputError(
+                f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
+                "option. Give one of them."
+            )
+        stance = file.stance()
+        echo_notes(stance.robot.notes)
+        return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
+    if not robot:
+        raise InvalidInputError(
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE; "
+            "see --help."
+        )
+    check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:
         if contact_at == "sole":
             raise InvalidInputError(
@@ -124,12 +180,17 @@ def read_stance(
         source,
         contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
         contact_at=contact_at,
+        soles=soles,
         package_dirs=package_dirs,
         posture=positions,
-        base_rpy=None if base_yaw is None else (0.0, 0.0, base_yaw),
+        base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
+        drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
-    return put_loads(stance, loads, payloads)
+    echo_notes(soles_read(stance))
+    return written(
+        put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
+    )
 
 
 def _read_contacts(
@@ -197,6 +258,22 @@ def _raised(contact: Contact, height: float) -> Contact:
 
     x, y, z = (float(c) * height for c in contact.rotation[:, 2])
     return replace(contact, offset=(x, y, z))
+
+
+def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:
+    """``--base-yaw`` or ``--base-rpy`` as roll, pitch, yaw [rad]."""
+    if text is None:
+        return None if yaw is None else (0.0, 0.0, yaw)
+    if yaw is not None:
+        raise InvalidInputError("--base-rpy holds the yaw as well as --base-yaw. Give one.")
+    try:
+        roll, pitch, yaw = (read_quantity(angle, "rad") for angle in text.split(":"))
+    except ValueError:
+        raise InvalidInputError(
+            f"the orientation {text!r} is not understood. Give ROLL:PITCH:YAW (degrees), such as "
+            "90:0:0."
+        ) from None
+    return roll, pitch, yaw
 
 
 def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -1,14 +1,15 @@
 """Quantities as people type them: degrees for angles, metres for lengths, or the unit given.
 
 One reader for every command: ``20`` is 20 degrees where an angle is meant and 20 metres where a
-length is; ``20deg``, ``0.35rad``, ``0.1m``, ``10cm`` and ``25mm`` say it themselves.
+length is; ``20deg``, ``0.35rad``, ``0.1m``, ``10cm`` and ``25mm`` say it themselves. Times, speeds,
+frequencies, forces and moments are read likewise, bare in SI, but what turns in degrees.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import click
 
@@ -21,16 +22,49 @@ if TYPE_CHECKING:
 else:  # not generic in click 8.1
     _ParamType = click.ParamType
 
-Unit = Literal["rad", "m"]
+Unit = Literal["rad", "m", "s", "rad/s", "m/s", "Hz", "kg", "N", "Nm", "Ns"]
 
-# SI unit -> how it may be written -> size; the first is what a bare number means.
-_WRITTEN: dict[str, dict[str, float]] = {
-    "rad": {"deg": math.pi / 180.0, "rad": 1.0},
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
-}
-_EXAMPLES = {
-    "rad": "an angle, such as 20 (degrees), 20deg or 0.35rad",
-    "m": "a length, such as 0.1 (metres), 0.1m or 100mm",
+
+class _Kind(NamedTuple):
+    """What a unit measures: its name, an example, and how it may be written -> the number in SI.
+
+    The first way to write it is what a bare number means.
+    """
+
+    name: str
+    example: str
+    written: dict[str, Callable[[float], float]]
+
+
+def _hundredth(number: float) -> float:
+    return number / 100.0  # not times 0.01: 13mm is to be the very number 0.013
+
+
+def _thousandth(number: float) -> float:
+    return number / 1000.0
+
+
+_KINDS: dict[str, _Kind] = {
+    "rad": _Kind("angle", "20 (degrees), 20deg or 0.35rad", {"deg": math.radians, "rad": float}),
+    "m": _Kind(
+        "length", "0.1 (metres), 0.1m or 100mm", {"m": float, "mm": _thousandth, "cm": _hundredth}
+    ),
+    "s": _Kind("time", "0.002 (seconds), 0.002s or 2ms", {"s": float, "ms": _thousandth}),
+    "rad/s": _Kind(
+        "rate",
+        "1 (degree per second), 1deg/s or 0.02rad/s",
+        {"deg/s": math.radians, "rad/s": float},
+    ),
+    "m/s": _Kind(
+        "speed",
+        "0.01 (m/s), 0.01m/s or 10mm/s",
+        {"m/s": float, "mm/s": _thousandth, "cm/s": _hundredth},
+    ),
+    "Hz": _Kind("frequency", "0.5 (Hz) or 0.5Hz", {"Hz": float}),
+    "kg": _Kind("mass", "2.5 (kg) or 2.5kg", {"kg": float}),
+    "N": _Kind("force", "40 (N) or 40N", {"N": float}),
+    "Nm": _Kind("moment", "30 (Nm) or 30Nm", {"Nm": float}),
+    "Ns": _Kind("impulse", "2 (N s) or 2Ns", {"Ns": float}),
 }
 
 
@@ -39,23 +73,26 @@ def read_quantity(text: str, unit: Unit) -> float:
 
     Args:
         text: such as ``"20"``, ``"20deg"`` or ``"25mm"``.
-        unit: what is meant: ``"rad"`` (a bare number is in degrees) or ``"m"``.
+        unit: what is meant, such as ``"rad"`` (a bare number is in degrees) or ``"m"``.
 
     Raises:
         InvalidInputError: not a number, or one in a unit of another kind.
     """
-    written = _WRITTEN[unit]
-    usual = next(iter(written))
-    for ending in sorted(written, key=len, reverse=True):
+    kind = _KINDS[unit]
+    usual = next(iter(kind.written))
+    for ending in sorted(kind.written, key=len, reverse=True):
         if text.endswith(ending):
             try:
-                return float(text.removesuffix(ending)) * written[ending]
+                return kind.written[ending](float(text.removesuffix(ending)))
             except ValueError:
                 continue
     try:
-        return float(text) * written[usual]
+        return kind.written[usual](float(text))
     except ValueError:
-        raise InvalidInputError(f"{text!r} is not understood. Give {_EXAMPLES[unit]}.") from None
+        article = "an" if kind.name[0] in "ai" else "a"
+        raise InvalidInputError(
+            f"{text!r} is not understood. Give {article} {kind.name}, such as {kind.example}."
+        ) from None
 
 
 def read_range(text: str, unit: Unit) -> tuple[float, float, int]:
@@ -87,12 +124,13 @@ def read_positions(texts: Iterable[str], robot: Robot) -> dict[str, float]:
     }
 
 
-def read_assignments(texts: Iterable[str], form: str) -> dict[str, float]:
+def read_assignments(texts: Iterable[str], form: str, unit: Unit | None = None) -> dict[str, float]:
     """``NAME=NUMBER`` options as a dictionary.
 
     Args:
         texts: the options.
         form: how to write one, for the error message.
+        unit: of the numbers; None for numbers without.
 
     Raises:
         InvalidInputError: not an assignment of a number.
@@ -100,7 +138,7 @@ def read_assignments(texts: Iterable[str], form: str) -> dict[str, float]:
     values = {}
     for name, number in _pairs(texts, form):
         try:
-            values[name] = float(number)
+            values[name] = float(number) if unit is None else read_quantity(number, unit)
         except ValueError:
             raise InvalidInputError(
                 f"{f'{name}={number}'!r} is not understood. Give {form}."
@@ -120,9 +158,9 @@ class Quantity(_ParamType):
     """An option's value as a quantity in SI; a bad one is bad usage."""
 
     def __init__(self, unit: Unit) -> None:
-        """Remember what is meant, ``"rad"`` or ``"m"``."""
+        """Remember what is meant, such as ``"rad"`` or ``"m"``."""
         self.unit: Unit = unit
-        self.name = "angle" if unit == "rad" else "length"
+        self.name = _KINDS[unit].name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The SI number; a default that is a number already is kept."""
@@ -136,3 +174,4 @@ class Quantity(_ParamType):
 
 LENGTH = Quantity("m")
 ANGLE = Quantity("rad")
+TIME = Quantity("s")

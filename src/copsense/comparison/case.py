@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -61,9 +62,13 @@ class Case:
             self.trial_name,
         )
 
-    @cached_property
+    @property
     def parameters(self) -> dict[str, Any]:
         """Everything that the scores depend on, as plain data."""
+        return deepcopy(self._parameters)
+
+    @cached_property
+    def _parameters(self) -> dict[str, Any]:
         parts = ("robot", "posture", "controller", "trial", "conditions")
         found = {name: plain(getattr(self, name)) for name in parts}
         if self.robot.source not in PRESETS and Path(self.robot.source).is_file():
@@ -77,7 +82,7 @@ class Case:
     @cached_property
     def key(self) -> str:
         """A short name, the same for the same parameters in every process."""
-        return digest(self.parameters)[:12]
+        return digest(self._parameters)[:12]
 
 
 def make_plan(

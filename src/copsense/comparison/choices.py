@@ -9,6 +9,7 @@ from typing import Any
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact, rectangle
+from copsense.content import freeze
 from copsense.controllers import STIFF, Gains, public_gains
 from copsense.criterion import Criterion, criterion_named
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -68,6 +69,7 @@ class RobotChoice:
         """Set the default name and validate the soles."""
         object.__setattr__(self, "name", self.name or Path(self.source).stem)
         object.__setattr__(self, "contacts", tuple(self.contacts))
+        freeze(self, "soles")
         finite_number(self.sole_height, f"the sole height of robot {self.name!r} [m]")
         for frame, sole in (self.soles or {}).items():
             numbers = [finite_number(x, f"the sole of {frame} [m]") for x in sole]
@@ -117,7 +119,8 @@ class PostureChoice:
     joints: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        """Validate knees and width."""
+        """Own the joints; validate knees and width."""
+        freeze(self, "joints")
         if self.knees is not None:
             finite_number(self.knees, f"the knees' bend of posture {self.name!r} [rad]")
         if self.width is not None:
@@ -201,7 +204,8 @@ class Conditions:
     values: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
-        """Reject names that are not fields of a scenario, or are set by the trial."""
+        """Own the values; reject names that no scenario has, or that the trial sets."""
+        freeze(self, "values")
         known = [f.name for f in fields(Scenario) if f.name not in ("duration", "reference")]
         for name in self.values or {}:
             if name not in known:

@@ -265,6 +265,30 @@ KINDS: dict[str, type[Lean | PushToTip | Sway | Rest | Falls | Breaking]] = {
 }
 
 
+# What an option is measured in, in every trial that has it; those without a unit are left out.
+_UNITS = {
+    "amplitude": "m",
+    "duration": "s",
+    "frequency": "Hz",
+    "largest": "Ns",
+    "position_noise": "rad",
+    "reach": "m",
+    "resolution": "Ns",
+    "speed": "m/s",
+    "velocity": "m/s",
+    "velocity_noise": "rad/s",
+    "watch": "s",
+}
+_BROKEN = {"delay": "s", "bandwidth": "Hz", "velocity_noise": "rad/s", "torque_limit": "Nm"}
+
+
+def option_unit(kind: str, option: str) -> str | None:
+    """The SI unit of a trial's option, None where it has none, is a word, or is not known."""
+    if kind in _BROKEN and option in ("mild", "severe", "step"):
+        return _BROKEN[kind]
+    return _UNITS.get(option)
+
+
 def trial_named(kind: str, /, **options: object) -> Trial:
     """A trial by its name in plans and on the command line.
 

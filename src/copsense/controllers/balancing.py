@@ -53,6 +53,11 @@ class BalancingController:
         name: how it is called in results; default the criterion's name.
     """
 
+    def __repr__(self) -> str:
+        """Criterion, robot and limits."""
+        within = f" within {self.limits!r}" if self.limits is not None else ""
+        return f"BalancingController({self.name} on {self.stance.robot.name!r}{within})"
+
     def __init__(
         self,
         stance: Stance,

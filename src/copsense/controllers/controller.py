@@ -10,12 +10,13 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import finite_array, is_finite
+from copsense.content import ShortRepr
 from copsense.controllers.target import Target
 from copsense.errors import ControllerError, InvalidInputError
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Observation(ShortRepr):
     """What a controller receives at one instant.
 
     Attributes:
@@ -34,8 +35,8 @@ class Observation:
     wrenches: Float[np.ndarray, "nc 6"]
 
 
-@dataclass(frozen=True, eq=False)
-class Command:
+@dataclass(frozen=True, eq=False, repr=False)
+class Command(ShortRepr):
     """A controller's torques, with the contact wrenches that they should cause.
 
     Attributes:

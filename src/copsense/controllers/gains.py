@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from copsense.arrays import finite_array, finite_number
+from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
 
@@ -37,7 +38,8 @@ class Gains:
     scaled_by_inertia: bool = True
 
     def __post_init__(self) -> None:
-        """Validate that all gains are finite; unstable ones are allowed."""
+        """Own them; validate that all are finite. Unstable ones are allowed."""
+        freeze(self, "posture_stiffness", "posture_damping")
         for name in ("com_stiffness", "com_damping"):
             finite_array(getattr(self, name), f"the gain {name}", (3,), "world x, y, z")
         for name in ("momentum_damping", "momentum_stiffness"):

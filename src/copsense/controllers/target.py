@@ -17,6 +17,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_number
+from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.path import PosturePath, lateral_sweep
 from copsense.stance import Stance
@@ -26,8 +27,8 @@ _COARSE = 10  # times as far apart are those that find out whether it can be rea
 _SLACK = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class Target:
+@dataclass(frozen=True, eq=False, repr=False)
+class Target(ShortRepr):
     """What the robot should do at one instant.
 
     Attributes:
@@ -183,6 +184,10 @@ class PathReference:
         path: the postures.
         signal: where along the path's coordinate to be at each time.
     """
+
+    def __repr__(self) -> str:
+        """The signal and the path."""
+        return f"PathReference({self.signal!r} along {self.path!r})"
 
     def __init__(self, path: PosturePath, signal: Signal) -> None:
         """Prepare the interpolation.

@@ -8,6 +8,7 @@ from typing import Any
 
 from copsense._version import __version__
 from copsense.arrays import whole_number
+from copsense.content import ShortRepr
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
@@ -18,8 +19,8 @@ from copsense.stance import Stance
 FORMAT = 2  # of the store; counted up when what is written changes
 
 
-@dataclass(frozen=True, eq=False)
-class MapPlan:
+@dataclass(frozen=True, eq=False, repr=False)
+class MapPlan(ShortRepr):
     """What to map, and in which pieces.
 
     Attributes:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
+from copsense.content import ShortRepr, freeze
+from copsense.json_data import json_data
 from copsense.maps.columns import EVALUATED, STATUS
 from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
 from copsense.maps.store import MapStore
@@ -14,8 +17,8 @@ from copsense.maps.store import MapStore
 LEVELS = (1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0)  # percent
 
 
-@dataclass(frozen=True)
-class WorstPosture:
+@dataclass(frozen=True, repr=False)
+class WorstPosture(ShortRepr):
     """A posture that is among the worst.
 
     Attributes:
@@ -32,9 +35,13 @@ class WorstPosture:
     contact: str = ""
     tipping_edge: int = -1
 
+    def __post_init__(self) -> None:
+        """Own the coordinates."""
+        freeze(self, "coordinates")
 
-@dataclass(frozen=True)
-class FailedPosture:
+
+@dataclass(frozen=True, repr=False)
+class FailedPosture(ShortRepr):
     """The first posture that was not evaluated, of those of one status.
 
     Attributes:
@@ -47,9 +54,13 @@ class FailedPosture:
     coordinates: Mapping[str, float]
     reason: str
 
+    def __post_init__(self) -> None:
+        """Own the coordinates."""
+        freeze(self, "coordinates")
 
-@dataclass(frozen=True)
-class CriterionSummary:
+
+@dataclass(frozen=True, repr=False)
+class CriterionSummary(ShortRepr):
     """A map under one criterion.
 
     Attributes:
@@ -69,9 +80,13 @@ class CriterionSummary:
     gain_percentiles: Mapping[float, float]
     failed: Mapping[str, FailedPosture]
 
+    def __post_init__(self) -> None:
+        """Own the mappings."""
+        freeze(self, "counts", "travel_percentiles", "gain_percentiles", "failed")
 
-@dataclass(frozen=True)
-class MapSummary:
+
+@dataclass(frozen=True, repr=False)
+class MapSummary(ShortRepr):
     """A map in a few numbers.
 
     Attributes:
@@ -94,10 +109,37 @@ class MapSummary:
     chunks_done: int
     criteria: Mapping[str, CriterionSummary]
 
+    def __post_init__(self) -> None:
+        """Own the mapping."""
+        freeze(self, "criteria")
+
     @property
     def complete(self) -> bool:
         """Whether every chunk is done."""
         return self.chunks_done == self.chunks
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``copsense map --json`` prints: plain data, None for what is infinite."""
+        data: dict[str, Any] = {
+            "robot": self.robot,
+            "output": self.path,
+            "coordinates": dict(zip(self.coordinates, self.units, strict=True)),
+            "postures": self.postures,
+            "complete": self.complete,
+            "criteria": {
+                name: {
+                    "counts": row.counts,
+                    "share": {k: n / self.postures for k, n in row.counts.items()},
+                    "worst_travel": [asdict(w) for w in row.worst_travel],
+                    "worst_gain": [asdict(w) for w in row.worst_gain],
+                    "travel_percentiles": row.travel_percentiles,
+                    "gain_percentiles": row.gain_percentiles,
+                    "failed": {status: asdict(first) for status, first in row.failed.items()},
+                }
+                for name, row in self.criteria.items()
+            },
+        }
+        return dict(json_data(data))
 
 
 def summarise(store: MapStore, progress: Callable[[int], object] | None = None) -> MapSummary:

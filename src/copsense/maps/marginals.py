@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.maps.columns import EVALUATED
 from copsense.maps.reduction import QUANTITIES
@@ -45,6 +46,10 @@ class Marginal:
     edges: tuple[np.ndarray, np.ndarray]
     criteria: tuple[str, ...]
     values: Float[np.ndarray, "nk a b"]
+
+    def __post_init__(self) -> None:
+        """Own the numbers."""
+        freeze(self, "edges", "values")
 
     def __repr__(self) -> str:
         """Its quantity, coordinates and size."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from copsense.content import ShortRepr
 from copsense.maps.columns import EVALUATED, STATUS, Chunk
 
 WORST = 10  # postures of each chunk, and of the map, that are kept by name
@@ -20,8 +21,8 @@ _HALF = 1 << 16  # values of half a key
 QUANTITIES = {"least_com_travel": 1.0, "largest_com_gain": -1.0}
 
 
-@dataclass(frozen=True, eq=False)
-class Part:
+@dataclass(frozen=True, eq=False, repr=False)
+class Part(ShortRepr):
     """What one chunk contributes; folding two gives another.
 
     Attributes:

@@ -66,6 +66,10 @@ class MapStore:
         self._parts = dict(group["parts"].arrays())
         self._size = int(self.parameters["chunk"])
 
+    def __repr__(self) -> str:
+        """Where it is, and over what."""
+        return f"MapStore({str(self.path)!r} over {', '.join(self.names)})"
+
     @property
     def attributes(self) -> dict[str, Any]:
         """Attributes of the root."""

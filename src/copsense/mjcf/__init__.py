@@ -2,8 +2,9 @@
 
 With MuJoCo installed, everything comes from its compiled model: `compiled` reads the file,
 `scene` finds the robot among what stands beside it, `tree_model` builds the ``pin.Model``,
-`effort` its effort limits, `unused` says what is left out, and `audit` compares. Without MuJoCo,
-`plain` reads the files that Pinocchio's own reader is known to read right.
+`effort` its effort limits, `driving` its motors, springs, couplings and loops, `unused` says what
+is left out, and `audit` compares. Without MuJoCo, `plain` reads the files that Pinocchio's own
+reader is known to read right.
 """
 
 from __future__ import annotations

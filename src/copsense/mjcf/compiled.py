@@ -6,15 +6,19 @@ import warnings
 from typing import Any
 
 import mujoco
+import numpy as np
+import pinocchio as pin
 
 from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.mjcf.audit import check_against
 from copsense.mjcf.collision import collision_shapes
+from copsense.mjcf.driving import read_drives
 from copsense.mjcf.effort import effort_limits
+from copsense.mjcf.gravity import usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
 from copsense.mjcf.scene import find_robot, left_out
-from copsense.mjcf.tree_model import build_tree
+from copsense.mjcf.tree_model import build_tree, pose
 from copsense.mjcf.unused import unused
 
 _UNNAMED = "MuJoCo Model"  # what MuJoCo calls a model without a name
@@ -30,12 +34,16 @@ def read_compiled(description: Description) -> MjcfReading:
         tree = build_tree(mj, root)
     except (InvalidInputError, ModelLoadError) as error:
         raise type(error)(f"{_what(description)}: {error}") from None
+    gravity, said = usable_gravity(np.array(mj.opt.gravity))
+    tree.model.gravity = pin.Motion(gravity, np.zeros(3))
     tree.model.name = name or mj.body(root).name or "robot"
     tree.model.upperEffortLimit = effort_limits(mj, tree)
     tree.model.lowerEffortLimit = -tree.model.upperEffortLimit
     check_against(mj, tree)
-    notes = (*warned, *left_out(mj, root), *unused(mj, tree))
-    return MjcfReading(tree.model, collision_shapes(mj, tree), notes)
+    drives, assumed = read_drives(mj, tree)
+    notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree), *assumed)
+    base = np.array(pose(np.zeros(3), mj.body_quat[root]).rotation)
+    return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives, base)
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -24,7 +24,7 @@ def effort_limits(mj: Any, tree: Tree) -> Float[np.ndarray, " nv"]:
     for joint, moved in tree.joints.items():
         if mj.jnt_type[joint] not in _SINGLE:
             continue
-        forces = [_largest_force(mj, a) for a in actuators_of(mj, joint)]
+        forces = [largest_force(mj, a) for a in actuators_of(mj, joint)]
         limit = sum(forces) if forces else np.inf
         if mj.jnt_actfrclimited[joint]:
             limit = min(limit, _smaller_side(mj.jnt_actfrcrange[joint]))
@@ -32,8 +32,8 @@ def effort_limits(mj: Any, tree: Tree) -> Float[np.ndarray, " nv"]:
     return limits
 
 
-def _largest_force(mj: Any, actuator: int) -> float:
-    """Largest force of an actuator at its joint."""
+def largest_force(mj: Any, actuator: int) -> float:
+    """Largest force of an actuator at its joint, or along its tendon."""
     gear = abs(float(mj.actuator_gear[actuator][0]))
     if mj.actuator_forcelimited[actuator]:
         return gear * _smaller_side(mj.actuator_forcerange[actuator])

@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.drives import Drives
+
 
 @dataclass(frozen=True, eq=False)
 class MjcfShape:
@@ -38,8 +40,12 @@ class MjcfReading:
         model: the Pinocchio model, with a floating (or planar) base as its first joint.
         shapes: its collision shapes; None where Pinocchio reads them from the file, if asked.
         notes: what the file says and is not used, a sentence each.
+        drives: its motors, springs, couplings and loops.
+        base: orientation (3, 3) of the root body in the file's world; None where it is not known.
     """
 
     model: pin.Model
     shapes: tuple[MjcfShape, ...] | None
     notes: tuple[str, ...] = ()
+    drives: Drives = field(default_factory=Drives)
+    base: Float[np.ndarray, "3 3"] | None = None

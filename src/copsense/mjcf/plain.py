@@ -16,6 +16,7 @@ import pinocchio as pin
 
 from copsense.description import Description
 from copsense.errors import ModelLoadError
+from copsense.mjcf.gravity import STANDARD_GRAVITY, usable_gravity
 from copsense.mjcf.mjcf_reading import MjcfReading
 
 _REMEDY = 'Install MuJoCo, which reads it: pip install "copsense[sim]"'
@@ -57,7 +58,8 @@ _NOT_BY_DEFAULT = {"joint": {"pos"}, "geom": {"mesh"}, "site": {"pos", "quat"}}
 _NOT_USED = {
     "equality": "equalities ({}) are not used.",
     "tendon": "tendons ({}) are not used.",
-    "actuator": "actuators ({}) are not read without MuJoCo: no effort limit comes from them.",
+    "actuator": "actuators ({}) are not read without MuJoCo: no effort limit comes from them, "
+    "and every joint is taken to have a motor.",
 }
 _DROPPED = ("keyframe", *_NOT_USED)
 
@@ -77,6 +79,10 @@ def read_plain(description: Description) -> MjcfReading:
             f"{what} cannot be read without MuJoCo, for it has {'; '.join(unknown[:5])}{more}. "
             f"{_REMEDY}"
         )
+    if root.find("worldbody/body") is None:
+        raise ModelLoadError(
+            f"{what} holds no robot: its <worldbody> has no <body>. Correct the file."
+        )
     notes = tuple(_notes(root))
     gravity = _gravity(root)
     _strip(root)
@@ -89,8 +95,9 @@ def read_plain(description: Description) -> MjcfReading:
         raise ModelLoadError(
             f"{what} is not a readable MJCF: {lines[-1].rstrip('.')}. Correct the file."
         ) from None
-    model.gravity = pin.Motion(gravity, np.zeros(3))
-    return MjcfReading(model, None, notes)
+    used, said = usable_gravity(gravity)
+    model.gravity = pin.Motion(used, np.zeros(3))
+    return MjcfReading(model, None, (*said, *notes))
 
 
 def read_shapes(description: Description, model: pin.Model) -> list[pin.GeometryObject]:
@@ -155,9 +162,6 @@ def _unknown(root: ET.Element) -> Iterator[str]:
             yield f"eulerseq={compiler.get('eulerseq')!r}"
         if compiler.get("autolimits", "true") != "true":
             yield "autolimits='false'"
-    for flag in root.iterfind("option/flag"):
-        if flag.get("gravity") == "disable":
-            yield "gravity that is disabled"
     yield from _unknown_defaults(root)
     worlds = root.findall("worldbody")
     if len(worlds) > 1:
@@ -168,20 +172,25 @@ def _unknown(root: ET.Element) -> Iterator[str]:
     for world in worlds:
         yield from (f"<{e.tag}> in the world" for e in world if e.tag not in _IN_BODY)
     for body in bodies:
-        yield from _unknown_in(body, jointless_parent=False)
+        yield from _unknown_in(body, outermost=True)
 
 
 def _unknown_defaults(root: ET.Element) -> Iterator[str]:
+    unweighed = any(b.find("inertial") is None for b in root.iterfind("worldbody//body"))
     for default in root.iter("default"):
         for element in default:
             given = set(element.keys())
+            if element.tag == "geom" and "0" in _collides(element) and unweighed:
+                yield "geoms of a class that do not collide and give bodies their mass"
             wrong = given & _NOT_BY_DEFAULT.get(element.tag, set())
             if element.tag in _ATTRIBUTES:
                 wrong |= given - _ATTRIBUTES[element.tag]
             yield from (f"{a}= of a {element.tag} in a <default>" for a in sorted(wrong))
 
 
-def _unknown_in(body: ET.Element, *, jointless_parent: bool) -> Iterator[str]:
+def _unknown_in(body: ET.Element, *, outermost: bool) -> Iterator[str]:
+    if not body.get("name"):
+        yield "a body without a name"
     where = f"body {body.get('name', '')!r}"
     jointless = not any(e.tag in ("joint", "freejoint") for e in body)
     weighed = body.find("inertial") is not None
@@ -196,10 +205,16 @@ def _unknown_in(body: ET.Element, *, jointless_parent: bool) -> Iterator[str]:
             yield from (f"{a}= of {label}" for a in sorted(set(element.keys()) - known))
         if element.tag == "geom" and element.get("mesh") and not weighed:
             yield f"a mesh that gives {where} its mass"
-        if element.tag == "site" and jointless and jointless_parent:
-            yield f"{label}, which like its parent has no joint"
+        if element.tag == "geom" and "0" in _collides(element) and not weighed:
+            yield f"a geom that does not collide and gives {where} its mass"
+        if element.tag == "site" and jointless and not outermost:
+            yield f"{label}, which has no joint"
     for child in body.findall("body"):
-        yield from _unknown_in(child, jointless_parent=jointless)
+        yield from _unknown_in(child, outermost=False)
+
+
+def _collides(geom: ET.Element) -> tuple[str, str]:
+    return geom.get("contype", "1").strip(), geom.get("conaffinity", "1").strip()
 
 
 def _notes(root: ET.Element) -> Iterator[str]:
@@ -214,11 +229,13 @@ def _notes(root: ET.Element) -> Iterator[str]:
 
 
 def _gravity(root: ET.Element) -> np.ndarray:
-    """Gravity of the file [m/s^2]."""
-    gravity = np.array([0.0, 0.0, -9.81])
+    """Gravity of the file (3,) [m/s^2]."""
+    gravity = np.array(STANDARD_GRAVITY)
     for option in root.findall("option"):
         if option.get("gravity") is not None:
             gravity = np.array([float(g) for g in option.get("gravity", "").split()])
+        if any(flag.get("gravity") == "disable" for flag in option.findall("flag")):
+            gravity = np.zeros(3)
     return gravity
 
 

@@ -122,10 +122,10 @@ def _likely(mj: Any) -> int:
     ):
         if len(candidates) == 1:
             return candidates[0]
-    if not trees:
+    if not any(joints[t] or mj.body_subtreemass[t] for t in trees):
         raise ModelLoadError(
-            "the MJCF holds no robot: its <worldbody> has no <body> that is not a mocap body. "
-            "Correct the file."
+            "the MJCF holds no robot: its <worldbody> has no <body> that moves or has "
+            "mass. Correct the file."
         )
     choices = listed(_described(mj, t) for t in (limbed or sorted(free) or trees))
     raise InvalidInputError(

@@ -68,7 +68,6 @@ def build_tree(mj: Any, root: int) -> Tree:
     """
     model = pin.Model()
     tree = Tree(model, root, base_joints(mj, root))
-    model.gravity = pin.Motion(np.array(mj.opt.gravity), np.zeros(3))
     owners: list[int | None] = [None]  # MuJoCo's joint behind each of Pinocchio's
     frames: dict[int, int] = {}  # of each body
     for body in _depth_first(mj, root):
@@ -195,6 +194,11 @@ def _inertia(mj: Any, body: int) -> pin.Inertia:
     """Mass, centre of mass and inertia of a body, in its axes."""
     turn = pose(np.zeros(3), mj.body_iquat[body]).rotation
     about_com = turn @ np.diag(mj.body_inertia[body]) @ turn.T
+    if not np.isfinite(about_com).all():
+        raise ModelLoadError(
+            f"the inertia of body {mj.body(body).name!r} is not finite. Correct its mass and size."
+        )
+    about_com = (about_com + about_com.T) / 2  # rounding of an inertia that is very large
     return pin.Inertia(float(mj.body_mass[body]), np.array(mj.body_ipos[body]), about_com)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.json_data import json_data
 from copsense.limits import Limits
@@ -38,6 +39,10 @@ class ComRegions(Mapping[str, ComRegion]):
     supported: ComRegion
     actuated: ComRegion | None
     unclipped: Mapping[str, ComRegion]
+
+    def __post_init__(self) -> None:
+        """Own the position and the mapping."""
+        freeze(self, "com", "unclipped")
 
     def __getitem__(self, name: str) -> ComRegion:
         """The region of a name."""

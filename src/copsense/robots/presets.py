@@ -14,13 +14,14 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.contact import Contact, rectangle
+from copsense.content import ShortRepr, freeze
 from copsense.errors import MissingExtraError, ModelLoadError
 from copsense.robot import Robot
 from copsense.robots.four_bar import four_bar_angles, four_bar_robot
 
 
-@dataclass(frozen=True, eq=False)
-class Preset:
+@dataclass(frozen=True, eq=False, repr=False)
+class Preset(ShortRepr):
     """A robot that copsense knows by name.
 
     Attributes:
@@ -44,6 +45,10 @@ class Preset:
     base_rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
     width: float | None = None
     sole_from_geometry: str | None = "sole"
+
+    def __post_init__(self) -> None:
+        """Own the posture."""
+        freeze(self, "posture")
 
 
 ICUB_JOINTS = (

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 import pinocchio as pin
@@ -14,21 +13,28 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, finite_number
+from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
-from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError, UnknownNameError
-from copsense.posture import solve_posture
+from copsense.drives import Drives
+from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
+from copsense.freedom import held_com_axes, missing_joints
+from copsense.posture import pull_back, solve_posture
 from copsense.robot import Robot
-from copsense.robots.presets import PRESETS, Preset, preset_robot
-from copsense.sole import read_sole, tilt_text
-from copsense.stance import Stance
+from copsense.robots.contact_soles import ContactAt, complete_contacts
+from copsense.robots.plausibility import check_plausible, check_size
+from copsense.robots.presets import PRESETS, preset_robot
+from copsense.robots.uprighting import base_turn, upright_contacts
+from copsense.shapes import Geometry
+from copsense.stance import Stance, check_support
 
-ContactAt = Literal["frame", "sole"]
-_OFF_SOLE = 1e-3  # m: a contact frame farther from the sole's bottom is said to be off it
+_UP = 0.1  # z of a plane's normal up to which it is a wall
+_OFF_MIDDLE = 1e-6  # m
+_AT_ZERO = 0.02  # rad or m: a range that begins so near to zero begins there
 
 
-class ContactGeometryWarning(UserWarning):
-    """A contact frame is not on the sole that the collision geometry shows."""
+class StandingWarning(UserWarning):
+    """A stance is not quite what was asked for."""
 
 
 def load_robot(
@@ -37,6 +43,8 @@ def load_robot(
     package_dirs: Iterable[str | Path] = (),
     frames: Iterable[str] = (),
     root: str | None = None,
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Robot:
     """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
 
@@ -46,13 +54,28 @@ def load_robot(
         frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
             tree that holds them is the robot.
         root: name of a body of the robot that is meant, where an MJCF holds several.
+        drives: what holds its joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
-        UnknownNameError: neither a preset nor a file, or no body is named `root`.
+        UnknownNameError: neither a preset nor a file, or no body is named `root`, or drives are
+            of a joint or frame that the robot has not.
         ModelLoadError: the file cannot be read.
         InvalidInputError: an MJCF holds several things that could be the robot.
         MissingExtraError: the preset's package is not installed.
     """
+    robot = _read(source, package_dirs, frames, root)
+    if drives is not None:
+        robot = robot.with_drives(drives)
+    return robot.without_motors(passive) if passive else robot
+
+
+def _read(
+    source: str | Path | Robot | pin.Model,
+    package_dirs: Iterable[str | Path],
+    frames: Iterable[str],
+    root: str | None,
+) -> Robot:
     if isinstance(source, Robot):
         return source
     if isinstance(source, pin.Model):
@@ -78,30 +101,61 @@ def load_stance(
     base_rpy: Sequence[float] | Float[np.ndarray, " 3"] | None = None,
     width: float | None = None,
     contact_at: ContactAt | None = None,
+    soles: Geometry = "collision",
     package_dirs: Iterable[str | Path] = (),
+    drives: Drives | None = None,
+    passive: Iterable[str] = (),
 ) -> Stance:
     """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
 
+    Where the contacts do not let the CoM go there, as legs that only pitch, it stays where it is,
+    with a warning. A contact whose frame has another axis up than z is turned, with a warning.
+    Joints not named start at zero, or inside their range where that leaves zero out.
+
     Args:
-        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``.
+        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``; or a stance file (.toml),
+            which says all the rest itself.
         contacts: frames (taken as surface contacts) or `Contact` values; default the preset's.
         posture: joint name -> position [rad, or m] that the stance stays nearest to; it replaces
             the preset's joint by joint.
-        base_rpy: roll, pitch, yaw of the base to start from [rad]; default the preset's.
+        base_rpy: roll, pitch, yaw of the base to start from [rad]; default the preset's, or the
+            quarter turn that puts a robot above its point contacts, with a warning.
         width: lateral distance between two feet [m].
         contact_at: ``"sole"`` puts each surface contact at the bottom of its collision geometry
             and reads its polygon; ``"frame"`` keeps it at the model's frame and reads the polygon
             if it can. Default: as the preset says; for another robot ``"frame"``, with a warning
             where that is not on the sole.
+        soles: which geometry soles are read from: what collides, or what is drawn, for a URDF
+            without collision geometry.
         package_dirs: folders that hold the packages of ``package://`` meshes.
+        drives: what holds the robot's joints, instead of what its file says.
+        passive: joints without a motor, beside those that have none already.
 
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
     """
     if contact_at not in (None, *get_args(ContactAt)):
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
+    if soles not in get_args(Geometry):
+        raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
+    if isinstance(source, str | Path) and str(source).endswith(".toml"):
+        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
+        if any(value is not None for value in given):
+            raise InvalidInputError(
+                f"the stance file {source} says how the robot stands, and so does another "
+                "argument. Change the file, or leave the argument out."
+            )
+        from copsense.robots.stance_file import StanceFile
+
+        return StanceFile.read(source).stance()
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
-    robot = load_robot(source, package_dirs=package_dirs, frames=_frames(contacts))
+    robot = load_robot(
+        source,
+        package_dirs=package_dirs,
+        frames=_frames(contacts),
+        drives=drives,
+        passive=passive,
+    )
     if contacts is None:
         if preset is None:
             likely = likely_feet(robot)
@@ -116,18 +170,22 @@ def load_stance(
     else:
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
-    chosen = _complete(robot, chosen, preset, contact_at)
     own = preset.posture if preset else {}
-    q = robot.configuration({**own, **(posture or {})})
+    q = robot.configuration({**rest_positions(robot), **own, **(posture or {})})
+    q = close(robot, q, held=posture if posture else own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "
-            "base_rpy (--base-yaw) out."
+            "base_rpy (--base-yaw, --base-rpy) out."
         )
-    rpy = np.array(preset.base_rpy if preset else (0.0, 0.0, 0.0))
     if base_rpy is not None:
-        rpy = finite_array(base_rpy, "base_rpy (--base-yaw)", (3,), "roll, pitch, yaw [rad]")
+        what = "base_rpy (--base-yaw, --base-rpy)"
+        rpy = finite_array(base_rpy, what, (3,), "roll, pitch, yaw [rad]")
+    else:
+        rpy = np.array(preset.base_rpy if preset else base_turn(robot, chosen, q))
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
+    check_size(Stance(robot, q, chosen, check=False))
+    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at, soles)
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
     return stand(robot, chosen, q, width=width)
@@ -136,11 +194,12 @@ def load_stance(
 def stand(
     robot: Robot, contacts: Sequence[Contact], q: ArrayLike, *, width: float | None = None
 ) -> Stance:
-    """Put a robot's contacts on their planes with its CoM over their middle.
+    """Put a robot's contacts on their planes with its CoM over the middle of those on the ground.
 
-    Each contact goes to the nearest place on its plane (the ground z = 0 where it has none) with
-    the nearest orientation flat on it; the posture stays nearest to `q`, turned as a whole so that
-    the first surface contact lies flat.
+    Each contact goes straight up or down to its plane (the ground z = 0 where it has none), or
+    straight onto its wall, with the nearest orientation flat on it; the posture stays nearest to
+    `q`, turned as a whole so that the first surface contact lies flat. Where the contacts hold the
+    CoM, it stays where it is, with a warning.
 
     Args:
         robot: the robot.
@@ -150,19 +209,23 @@ def stand(
 
     Raises:
         UnreachablePostureError: no such posture.
+        InsufficientContactsError: no posture on such contacts can be balanced.
+        InvalidInputError: lengths that are not metres, or a robot that hangs under its contacts.
     """
     loose = Stance(robot, np.asarray(q, dtype=float), tuple(contacts), check=False)
+    check_size(loose)
     planar = robot.base_nv != 6
-    first = next((k for k, c in enumerate(contacts) if c.kind == "surface"), None)
+    # Hands on a wall are put there by those who stand on the ground.
+    ground = [k for k, c in enumerate(contacts) if _plane(c).normal[2] > _UP]
+    ground = ground or list(range(len(contacts)))
+    first = next((k for k in ground if contacts[k].kind == "surface"), None)
     if first is not None:
         # Turn the whole robot about the horizontal, so that its first sole is flat.
         flat = _align(loose.placements[first].rotation[:, 2], _plane(contacts[first]))
         base = pin.Quaternion(loose.q[3:7]).matrix()
         loose = loose.at(_turn_base(robot, loose.q, flat @ base), check=False)
-    middle = np.mean([place.translation for place in loose.placements], axis=0)
-    heights = [
-        _height(c, p.translation - middle) for c, p in zip(contacts, loose.placements, strict=True)
-    ]
+    middle = np.mean([loose.placements[k].translation for k in ground], axis=0)
+    heights = [_height(contacts[k], loose.placements[k].translation - middle) for k in ground]
     loose = loose.at(_shift_base(robot, loose.q, -middle - [0, 0, np.mean(heights)]), check=False)
     targets = []
     for k, (contact, place) in enumerate(zip(contacts, loose.placements, strict=True)):
@@ -177,34 +240,66 @@ def stand(
             finite_number(width, "the stance width [m]", positive=True)
             left = place.translation[1] >= loose.placements[1 - k].translation[1]
             origin[:2] = 0.0, width / 2 if left else -width / 2
-        origin[2] -= _height(contact, origin)
-        targets.append(pin.SE3(flat @ place.rotation, origin))
-    centre = np.mean([target.translation for target in targets], axis=0)
+        normal = np.array(_plane(contact).normal)
+        along = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) > _UP else normal
+        targets.append(pin.SE3(flat @ place.rotation, origin - _height(contact, origin) * along))
+    centre = np.mean([targets[k].translation for k in ground], axis=0)
     com = (None if planar else float(centre[0]), float(centre[1]), None)
-    return solve_posture(loose, targets=targets, com=com).stance
+    return check_plausible(_settled(loose, targets, com))
 
 
-def sole_notes(stance: Stance) -> tuple[str, ...]:
-    """What is off between the contact frames and the soles, in words; empty where all is well.
-
-    Contacts whose geometry cannot be read are passed over.
-    """
-    notes = []
-    for contact in stance.contacts:
-        if contact.kind != "surface":
-            continue
+def _settled(
+    loose: Stance, targets: list[pin.SE3], com: tuple[float | None, float | None, float | None]
+) -> Stance:
+    """The posture with the contacts at their targets, and the CoM there as far as they let it."""
+    try:
+        return solve_posture(loose, targets=targets, com=com).stance
+    except UnreachablePostureError as error:
+        failure = error
+    check_support(loose)  # the true reason where points cannot carry a robot
+    try:
+        placed = pull_back(loose, targets)
+    except UnreachablePostureError:
+        raise failure from None
+    held = held_com_axes(placed)
+    free = tuple(None if axis in held else value for axis, value in enumerate(com))
+    for asked in dict.fromkeys([free, (com[0], None, None), (None, com[1], None), (None,) * 3]):
         try:
-            sole = read_sole(stance.robot, contact)
-        except CopsenseError:
+            found = solve_posture(placed, targets=targets, com=asked, reference=loose.q).stance
+        except UnreachablePostureError:
             continue
-        over = float(contact.rotation[:, 2] @ np.array(contact.offset)) - sole.height
-        if abs(over) > _OFF_SOLE:
-            notes.append(
-                f"contact {contact.name!r} lies {abs(over) * 1e3:.1f} mm "
-                f"{'over' if over > 0 else 'under'} the bottom of its collision geometry; "
-                "contact_at='sole' (--contact-at sole) puts it there."
-            )
-    return tuple(notes)
+        break
+    else:
+        found = placed
+    off = [
+        f"{'xy'[axis]} by {(found.com[axis] - value) * 1e3:+.3g} mm"
+        for axis, value in enumerate(com)
+        if value is not None and abs(found.com[axis] - value) > _OFF_MIDDLE
+    ]
+    if off:
+        why = "; ".join(missing_joints(found))
+        warnings.warn(
+            f"the CoM of {loose.robot.name!r} is not over the middle of its contacts, in "
+            f"{' and '.join(off)}: they cannot be moved under it from this posture"
+            + (f", for {why}" if why else "")
+            + ".",
+            StandingWarning,
+            stacklevel=4,
+        )
+    return found
+
+
+def rest_positions(robot: Robot) -> dict[str, float]:
+    """Joint -> a position inside its range, for joints whose range leaves zero out [rad, m]."""
+    lower, upper = robot.position_limits
+    inside = {}
+    for name, low, high in zip(robot.dof_names, lower.tolist(), upper.tolist(), strict=True):
+        if low > 0.0 or high < 0.0:
+            near, far = (low, high) if low > 0.0 else (high, low)
+            # A quarter of the range in; where it has no other end, or begins at once, its end.
+            deep = abs(near) > _AT_ZERO and np.isfinite(far)
+            inside[name] = near + (far - near) / 4 if deep else near
+    return inside
 
 
 def likely_feet(robot: Robot) -> tuple[str, ...]:
@@ -229,68 +324,6 @@ def _contact(given: object, known: Mapping[str, Contact]) -> Contact:
             f"{given!r} is not a contact. Give a frame's name, or Contact(frame=...)."
         )
     return given
-
-
-def _complete(
-    robot: Robot, contacts: tuple[Contact, ...], preset: Preset | None, at: ContactAt | None
-) -> tuple[Contact, ...]:
-    """Fill in offsets and polygons from the collision geometry.
-
-    A contact that the caller placed stays there, unless the sole is asked for.
-    """
-    mode = preset.sole_from_geometry if preset else None
-    known = {c.frame: c for c in preset.contacts} if preset else {}
-    completed = []
-    for contact in contacts:
-        own = known.get(contact.frame)
-        untouched = own is not None and (
-            contact.offset == own.offset and np.array_equal(contact.rotation, own.rotation)
-        )
-        lower = at == "sole" or (at is None and mode == "sole" and untouched)
-        outline = contact.polygon is None and (
-            at is not None or mode is not None or (not preset and robot.description is not None)
-        )
-        if contact.kind != "surface" or not (lower or outline):
-            completed.append(contact)
-            continue
-        robot.frame(contact.frame)
-        try:
-            sole = read_sole(robot, contact)
-        except ModelLoadError as error:
-            if lower:
-                raise
-            warnings.warn(
-                f"contact {contact.name!r} has no sole polygon, so no margin to its edge is known: "
-                f"{error}",
-                ContactGeometryWarning,
-                stacklevel=3,
-            )
-            completed.append(contact)
-            continue
-        if sole.tilt and contact.polygon is None:
-            warnings.warn(
-                f"contact {contact.name!r} was given the lowest edge alone as its sole, because "
-                f"{tilt_text(contact, sole.tilt)}. Turn the contact by its rotation so that the "
-                "underside lies flat, or give the polygon.",
-                ContactGeometryWarning,
-                stacklevel=3,
-            )
-        offset, up = np.array(contact.offset), contact.rotation[:, 2]
-        if lower:
-            offset = offset + up * (sole.height - up @ offset)
-        elif not preset and at is None and abs(sole.height - up @ offset) > _OFF_SOLE:
-            away = abs(sole.height - up @ offset) * 1e3
-            warnings.warn(
-                f"contact {contact.name!r} is {away:.1f} mm from the bottom of its collision "
-                "geometry. Give contact_at='sole' to put it there, or contact_at='frame' to keep "
-                "it.",
-                ContactGeometryWarning,
-                stacklevel=3,
-            )
-        x, y, z = (float(c) for c in offset)
-        polygon = sole.polygon if contact.polygon is None else contact.polygon
-        completed.append(replace(contact, offset=(x, y, z), polygon=polygon))
-    return tuple(completed)
 
 
 def _plane(contact: Contact) -> Plane:

@@ -10,6 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_array, finite_number
+from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
 from copsense.stance import Stance
@@ -71,7 +72,8 @@ class Motors:
     limit: float | Mapping[str, float] | str | None = None
 
     def __post_init__(self) -> None:
-        """Validate delay and bandwidth; limits are validated with the robot."""
+        """Validate delay and bandwidth; limits are owned here and validated with the robot."""
+        freeze(self, "limit")
         if not 0 <= finite_number(self.delay, "the delay of the motors [s]") <= 1:
             raise InvalidInputError(
                 f"the delay of the motors is {self.delay} s. Give a time from 0 to 1."
@@ -169,7 +171,8 @@ class ModelError:
     payload: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Validate the masses."""
+        """Own the payload; validate the masses."""
+        freeze(self, "payload")
         if not finite_number(self.mass, "the error of the mass") > -1:
             raise InvalidInputError(
                 f"the error of the mass is {self.mass:g}: no mass would be left. Give more than -1."

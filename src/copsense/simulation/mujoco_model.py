@@ -7,6 +7,7 @@ are simulated as they are analysed.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,8 +54,8 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     # One robot is one island: to look for others, and to copy its matrices, would be wasted.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     bodies = {0: spec.worldbody}
-    for i in range(1, model.njoints):
-        bodies[i] = _add_body(mujoco, robot, i, bodies[model.parents[i]])
+    for chain in _chains(stance):
+        bodies[chain[-1]] = _add_body(mujoco, robot, chain, bodies[model.parents[chain[0]]])
     for contact, world in zip(stance.contacts, stance.placements, strict=True):
         _add_contact(mujoco, spec, bodies, robot, contact, world, settings)
         for kind in ("FORCE", "TORQUE") if sensors else ():
@@ -77,10 +78,28 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
         ) from None
 
 
-def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
-    """Add the body moved by a joint of the model, and the joint."""
-    model = robot.model
-    place, inertia, joint = model.jointPlacements[i], model.inertias[i], model.joints[i]
+def _chains(stance: Stance) -> Iterator[list[int]]:
+    """The joints of each body: its own, before it those that move it but nothing else with mass.
+
+    MuJoCo gives one body several joints, and rejects bodies without mass.
+    """
+    model = stance.robot.model
+    stood_on = {contact.on(stance.robot).joint for contact in stance.contacts}
+    chain: list[int] = []
+    for i in range(1, model.njoints):
+        chain.append(i)
+        empty = i > 1 and not model.inertias[i].mass and not model.inertias[i].inertia.any()
+        if not (empty and list(model.children[i]) == [i + 1] and i not in stood_on):
+            yield chain
+            chain = []
+
+
+def _add_body(mujoco: Any, robot: Robot, chain: Sequence[int], parent: Any) -> Any:
+    """Add the body moved by joints of the model, and the joints."""
+    model, i = robot.model, chain[-1]
+    place, inertia = pin.SE3.Identity(), model.inertias[i]
+    for number in chain:
+        place = place * model.jointPlacements[number]
     body = parent.add_body(name=f"body {model.names[i]}", pos=place.translation, quat=_wxyz(place))
     body.explicitinertial = True
     body.mass, body.ipos = inertia.mass, inertia.lever
@@ -89,6 +108,18 @@ def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
     if i == 1:
         body.add_freejoint()
         return body
+    for at, number in enumerate(chain):
+        # MuJoCo has a body's joints in the body's own axes, as they are at zero.
+        before = pin.SE3.Identity()
+        for later in chain[at + 1 :]:
+            before = before * model.jointPlacements[later]
+        _add_joint(mujoco, robot, number, body, before.inverse())
+    return body
+
+
+def _add_joint(mujoco: Any, robot: Robot, i: int, body: Any, place: pin.SE3) -> None:
+    """Add a joint of the model that stands at a place in a body's axes."""
+    model, joint = robot.model, robot.model.joints[i]
     kind, subspace = joint.shortname(), np.ravel(joint.createData().S)
     if not kind.startswith((*_HINGES, *_SLIDES)) or joint.nv != 1 or not _unit(subspace):
         raise InvalidInputError(
@@ -99,10 +130,10 @@ def _add_body(mujoco: Any, robot: Robot, i: int, parent: Any) -> Any:
     body.add_joint(
         name=model.names[i],
         type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=subspace[3:] if hinge else subspace[:3],
+        pos=place.translation,
+        axis=place.rotation @ (subspace[3:] if hinge else subspace[:3]),
         armature=float(model.armature[joint.idx_v]),
     )
-    return body
 
 
 def _unit(subspace: np.ndarray) -> bool:

@@ -51,6 +51,10 @@ class MujocoSimulator:
         EngineMismatchError: MuJoCo's model of the robot differs from Pinocchio's.
     """
 
+    def __repr__(self) -> str:
+        """Robot, contacts and settings."""
+        return f"MujocoSimulator({self._stance!r}, {self.settings!r})"
+
     def __init__(
         self,
         stance: Stance,

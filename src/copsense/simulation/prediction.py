@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import ShortRepr, freeze
 from copsense.controllers import STIFF, Gains
 from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
 from copsense.criterion import Criterion
@@ -34,8 +35,8 @@ _AFTER = 1.0  # s: the controller has answered a push by then
 _HOW = {"cop": "tips", "normal force": "lifts", "friction": "slips"}
 
 
-@dataclass(frozen=True, eq=False)
-class StaticPrediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class StaticPrediction(ShortRepr):
     """The statics along a path, and to first order from its start.
 
     Attributes:
@@ -68,6 +69,10 @@ class StaticPrediction:
     reach: float
     start: ScanPoint
     quasi_static: QuasiStatic
+
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        freeze(self, "values", "cops", "margins", "torques", "joints")
 
     @property
     def statement(self) -> str:

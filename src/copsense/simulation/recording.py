@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.simulation.events import Event
@@ -136,9 +137,20 @@ class Recording(LabelledResult):
         return float(abs(self.before_first_tip["torque"]).max())
 
     def between(self, start: float, stop: float) -> Recording:
-        """The rows from one time to another, both included [s]."""
+        """The rows from one time to another, both included [s].
+
+        Raises:
+            InvalidInputError: there is no row in between.
+        """
         time = self["time"].values
-        return self._rows((time >= start) & (time <= stop))
+        rows = (time >= start) & (time <= stop)
+        if not rows.any():
+            raise InvalidInputError(
+                f"the recording has no row from {start:g} to {stop:g} s: it goes from {time[0]:g} "
+                f"to {time[-1]:g} s, a row every {np.diff(time).max(initial=0.0):g} s. Give two "
+                "times of these, the earlier first."
+            )
+        return self._rows(rows)
 
     def to_dict(self) -> dict[str, Any]:
         """What ``copsense balance --json`` prints: plain data, None for what is not a number.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from copsense.arrays import finite_number, whole_number
+from copsense.content import ShortRepr
 from copsense.controllers.target import Hold, PathReference, Signal
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.simulation.disturbance import FrictionChange, ModelError, Motors, Noise, Push
@@ -14,8 +15,8 @@ from copsense.stance import Stance
 LONGEST = 3600.0  # s
 
 
-@dataclass(frozen=True, eq=False)
-class Scenario:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scenario(ShortRepr):
     """What the robot has to do and what disturbs it.
 
     Attributes:

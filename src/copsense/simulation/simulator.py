@@ -8,12 +8,13 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from copsense.content import ShortRepr
 from copsense.errors import CopsenseError
 from copsense.stance import Stance
 
 
-@dataclass(frozen=True, eq=False)
-class Snapshot:
+@dataclass(frozen=True, eq=False, repr=False)
+class Snapshot(ShortRepr):
     """The state of a robot in motion, in the analysis's conventions.
 
     Attributes:

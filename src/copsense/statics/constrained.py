@@ -25,6 +25,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from copsense.arrays import owned
+from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.errors import (
     InfeasibleError,
@@ -67,8 +68,8 @@ class ActiveLimit:
         return self.multiplier == 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class ActiveSetChange:
+@dataclass(frozen=True, eq=False, repr=False)
+class ActiveSetChange(ShortRepr):
     """The next limit to begin or cease to press along a motion.
 
     A prediction to first order from one posture has the first five; what a search along a path
@@ -98,9 +99,13 @@ class ActiveSetChange:
     before: Float[np.ndarray, "nc 2"] | None = None
     after: Float[np.ndarray, "nc 2"] | None = None
 
+    def __post_init__(self) -> None:
+        """Own the slopes."""
+        freeze(self, "before", "after")
 
-@dataclass(frozen=True, eq=False)
-class Rates:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rates(ShortRepr):
     """One-sided derivatives of a constrained equilibrium along a motion.
 
     Attributes:
@@ -114,6 +119,10 @@ class Rates:
     torques: Float[np.ndarray, " n"]
     multipliers: Float[np.ndarray, " r"]
     slack: Float[np.ndarray, " r"]
+
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        freeze(self, "forces", "torques", "multipliers", "slack")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

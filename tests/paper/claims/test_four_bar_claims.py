@@ -177,7 +177,7 @@ def test_at_exactly_2_m_the_two_criteria_are_equally_sensitive():
     assert rows["lower-sensitivity"].verdict is DOES_NOT_HOLD
 
 
-def test_claims_on_a_linkage_that_cannot_unload_a_foot_are_refused():
+def test_claims_on_a_linkage_that_cannot_unload_a_foot_are_rejected():
     with pytest.raises(InvalidInputError, match="cannot travel"):
         evaluate_four_bar_claims(FourBar(rod_length=0.375))
 
@@ -196,7 +196,7 @@ def test_judge_is_a_truth_table(as_stated, under_condition, verdict):
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf])
-def test_a_number_that_decides_nothing_is_refused(number):
+def test_a_number_that_decides_nothing_is_rejected(number):
     with pytest.raises(InvalidInputError, match="finite"):
         Finding(HOLDS, number, "1", "")
 

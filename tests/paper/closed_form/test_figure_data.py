@@ -126,6 +126,6 @@ def test_an_unknown_curve_lists_the_valid_ones():
         {"least_load": 0.5},
     ],
 )
-def test_a_sampling_of_nothing_is_refused(wrong):
+def test_a_sampling_of_nothing_is_rejected(wrong):
     with pytest.raises(InvalidInputError, match=next(iter(wrong))):
         Sampling(**wrong)

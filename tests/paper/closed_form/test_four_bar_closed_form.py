@@ -228,19 +228,19 @@ def test_com_is_the_mean_of_the_masses():
 
 @pytest.mark.parametrize("name", ["leg_length", "rod_length", "leg_mass", "body_mass", "gravity"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-def test_a_linkage_of_no_size_is_refused(name, value):
+def test_a_linkage_of_no_size_is_rejected(name, value):
     with pytest.raises(InvalidInputError, match=name):
         FourBar(**{name: value})
 
 
 @pytest.mark.parametrize("xi", [math.nan, math.inf])
-def test_an_angle_that_is_not_finite_is_refused(xi):
+def test_an_angle_that_is_not_finite_is_rejected(xi):
     with pytest.raises(InvalidInputError, match="xi"):
         solve_four_bar(FourBar(), xi, "minimum-torque")
 
 
 @pytest.mark.parametrize("value", ["1", None, True, np.ones(2)])
-def test_what_is_no_number_is_refused(value):
+def test_what_is_no_number_is_rejected(value):
     # TypeError: with run-time type checks on, they get there first
     with pytest.raises((InvalidInputError, TypeError), match="leg_length"):
         FourBar(leg_length=value)
@@ -250,7 +250,7 @@ def test_what_is_no_number_is_refused(value):
 
 @pytest.mark.parametrize("criterion", FOUR_BAR_CRITERIA)
 @pytest.mark.parametrize("xi", [0.0, math.pi, -math.pi, 2 * math.pi])
-def test_a_collapsed_linkage_is_refused(criterion, xi):
+def test_a_collapsed_linkage_is_rejected(criterion, xi):
     with pytest.raises(InvalidInputError, match="collapsed"):
         solve_four_bar(FourBar(), xi, criterion)
 
@@ -264,7 +264,7 @@ def test_a_collapsed_linkage_is_refused(criterion, xi):
     ],
 )
 @pytest.mark.parametrize("value", [0.0, -2.0, math.nan, math.inf])
-def test_a_parameter_that_is_not_positive_is_refused(criterion, parameter, value):
+def test_a_parameter_that_is_not_positive_is_rejected(criterion, parameter, value):
     with pytest.raises(InvalidInputError, match=parameter):
         solve_four_bar(FourBar(), 1.4, criterion, **{parameter: value})
 
@@ -277,7 +277,7 @@ def test_unknown_names_list_the_valid_ones():
 
 
 @pytest.mark.parametrize(("side", "foot"), [(1, "left foot"), (-1, "right foot")])
-def test_a_bare_foot_is_refused_by_name(side, foot):
+def test_a_bare_foot_is_rejected_by_name(side, foot):
     four_bar = FourBar()
     # a u = d/2
     xi = math.acos(side * four_bar.rod_length / (four_bar.kappa * four_bar.leg_length))
@@ -286,7 +286,7 @@ def test_a_bare_foot_is_refused_by_name(side, foot):
     assert caught.value.contacts == (foot,)
 
 
-def test_magnitudes_that_overflow_are_refused():
+def test_magnitudes_that_overflow_are_rejected():
     with pytest.raises(InvalidInputError, match="overflow"):
         solve_four_bar_member(FourBar(), 1.4, 1e308, 0.0)
 

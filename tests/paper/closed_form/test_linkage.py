@@ -109,6 +109,6 @@ def test_lemma_3_holds_with_the_wrench_tie_break_on_level_feet_only():
     assert np.abs(by_torque.cop() - level[1]).max() > 0.01
 
 
-def test_no_objective_is_refused():
+def test_no_objective_is_rejected():
     with pytest.raises(InvalidInputError, match="objectives"):
         minimise_in_order(Linkage(FourBar()), XI, [])

@@ -69,6 +69,6 @@ def test_the_numbers_that_hide_kappa_three_fifths_agree_there():
     assert found["(18)"].as_printed > 0.1
 
 
-def test_errata_of_a_linkage_too_short_to_unload_a_foot_are_refused():
+def test_errata_of_a_linkage_too_short_to_unload_a_foot_are_rejected():
     with pytest.raises(InvalidInputError, match="shorter rod or longer legs"):
         evaluate_errata(FourBar(rod_length=0.4))

@@ -291,12 +291,15 @@ def test_a_report_that_is_stopped_leaves_nothing(reproduction, tmp_path, monkeyp
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_is_refused_before_the_work(tmp_path):
+def test_a_folder_that_cannot_be_is_rejected_before_the_work(tmp_path):
     file = tmp_path / "file"
     file.write_text("")
     with pytest.raises(OutputError, match="is a file"):
         check_report_folder(file)
-    with pytest.raises(OutputError, match="cannot be made"):
-        check_report_folder(file / "report")
-    assert check_report_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
+    for absent in (file / "report", tmp_path / "a" / "b"):
+        with pytest.raises(OutputError, match="Create it first"):
+            check_report_folder(absent)
+    with pytest.raises(OutputError, match="cannot be written"):
+        check_report_folder("/proc/report")
+    assert check_report_folder(tmp_path / "a") == tmp_path / "a"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

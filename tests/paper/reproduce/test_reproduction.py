@@ -171,12 +171,12 @@ def test_a_reproduction_says_what_it_was_made_with(reproduction):
     assert all(seconds > 0 for seconds in reproduction.timings.values())
 
 
-def test_too_few_postures_are_refused():
+def test_too_few_postures_are_rejected():
     with pytest.raises(InvalidInputError, match="5 postures or more"):
         reproduce_paper(postures=4)
 
 
-def test_a_sweep_that_lacks_something_is_refused(reproduction):
+def test_a_sweep_that_lacks_something_is_rejected(reproduction):
     lateral, four_bar = reproduction.lateral, FourBar()
     with pytest.raises(InvalidInputError, match="minimum-torque"):
         LateralSweep.from_dataset(lateral.subset([WRENCH]), four_bar)

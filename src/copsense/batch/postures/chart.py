@@ -70,6 +70,10 @@ class PostureChart:
     values: Float[np.ndarray, " k"]
     fallback_reason: str
 
+    def __repr__(self) -> str:
+        """Robot and coordinates."""
+        return f"PostureChart({self.stance.robot.name!r} over {', '.join(self.names)})"
+
     def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
         """Find out what the names mean.
 

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.arrays import finite_array
+from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stance import Stance
 
@@ -28,8 +29,8 @@ _UNITS: tuple[Unit, ...] = ("m", "m", "m", "rad", "rad", "rad")
 _STEEP = 0.2  # least vertical part of a plane's normal for a foot to be moved on it
 
 
-@dataclass(frozen=True, eq=False)
-class Limb:
+@dataclass(frozen=True, eq=False, repr=False)
+class Limb(ShortRepr):
     """Contacts that share joints, and what moves to keep them in place.
 
     Attributes:
@@ -41,8 +42,8 @@ class Limb:
     unknowns: tuple[int, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Coordinates:
+@dataclass(frozen=True, eq=False, repr=False)
+class Coordinates(ShortRepr):
     """What a chart's coordinates mean on a stance.
 
     Given numbers are, in order: the base (x, y, z, roll, pitch, yaw; a planar base's x, y, angle),

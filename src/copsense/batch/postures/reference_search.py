@@ -28,11 +28,12 @@ from copsense.batch.postures.search_settings import (
     TOLERANCE,
     UNSOLVED,
 )
+from copsense.content import ShortRepr
 from copsense.stance import Stance
 
 
-@dataclass(frozen=True, eq=False)
-class Attempt:
+@dataclass(frozen=True, eq=False, repr=False)
+class Attempt(ShortRepr):
     """Where a search ended.
 
     Attributes:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from copsense.content import freeze
 from copsense.stance import Stance
 
 
@@ -50,6 +51,10 @@ class BatchResult:
     load_share: Float[np.ndarray, "N nk nc"]
     com: Float[np.ndarray, "N 3"]
     reasons: Mapping[tuple[int, int], str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Own the reasons; the arrays may be the caller's."""
+        freeze(self, "reasons")
 
     def __len__(self) -> int:
         """Number of postures."""

@@ -43,6 +43,8 @@ class ReferenceValue:
 
 @dataclass(frozen=True)
 class _Row:
+    """A quantity as it was recorded, and how to measure it again."""
+
     quantity: str
     unit: str
     recorded: tuple[str, str]  # under criterion 1 and 2, as printed: the digits say how exact

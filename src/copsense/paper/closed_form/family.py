@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -72,6 +73,22 @@ class FourBarSolution:
                 )
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data of it, as ``copsense four-bar --json`` prints it: by foot and joint."""
+        sides = ("left", "right")
+        by_foot = {
+            name: dict(zip(sides, getattr(self, name).tolist(), strict=True))
+            for name in ("wrenches", "cop", "sensitivity", "cop_per_com")
+        }
+        joints = ("hipL", "ankleL", "hipR", "ankleR")
+        return {
+            "wrenches": by_foot.pop("wrenches"),
+            "torques": dict(zip(joints, self.torques.tolist(), strict=True)),
+            **by_foot,
+            "com": self.com.tolist(),
+            "load_transfer_share": self.share,
+        }
 
     def residual(self) -> float:
         """Largest imbalance of the linkage and its links, in parts of m g and m g (l + d).

@@ -39,9 +39,17 @@ def check_report_folder(folder: str | Path, *, overwrite: bool = False) -> Path:
             f"{folder} holds {', '.join(taken)} already. Give another folder, or --force "
             "(overwrite=True)."
         )
-    nearest = next(p for p in (folder, *folder.absolute().parents) if p.exists())
-    if not nearest.is_dir() or not os.access(nearest, os.W_OK):
-        raise OutputError(f"{folder} cannot be made: {nearest} cannot be written to.")
+    inside = folder if folder.exists() else folder.absolute().parent
+    if not inside.is_dir():
+        raise OutputError(
+            f"there is no folder {folder.parent} to make {folder.name} in. Create it first."
+        )
+    try:  # permission bits mislead (for root, on /proc, on a full disk)
+        tempfile.TemporaryDirectory(dir=inside, prefix=".copsense-").cleanup()
+    except OSError as error:
+        raise OutputError(
+            f"{folder} cannot be written: {error.strerror or error}. Choose another folder."
+        ) from None
     return folder
 
 
@@ -74,7 +82,6 @@ def write_report(
     staging = None
     try:
         parent = folder.absolute().parent
-        parent.mkdir(parents=True, exist_ok=True)
         staging = Path(tempfile.mkdtemp(dir=parent, prefix=f".{folder.name or 'report'}-"))
         _write_everything(reproduction, staging, command)
         _publish(staging, folder)

@@ -1,0 +1,64 @@
+"""The stance file of a command: read once, asked for stance, limits and criteria."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from copsense.robots import StanceFile
+    from copsense.stance import Stance
+
+_KEY = "copsense.stance_file"
+
+
+def remember_stance(
+    context: click.Context, parameter: click.Parameter, value: str | None
+) -> str | None:
+    """Read ``--stance FILE`` before the other options are looked at."""
+    if value is not None:
+        from copsense.robots import StanceFile
+
+        context.meta[_KEY] = StanceFile.read(value)
+    return value
+
+
+def remembered_stance() -> StanceFile | None:
+    """The file of the command that runs, or None."""
+    context = click.get_current_context(silent=True)
+    return None if context is None else context.meta.get(_KEY)
+
+
+def written(
+    stance: Stance,
+    path: str | None,
+    source: str | Path,
+    overwrite: bool,
+    package_dirs: Iterable[str] = (),
+) -> Stance:
+    """The stance, written to a file if one is asked for, with the command's limits and criteria."""
+    if path is not None:
+        file = remembered_stance()
+        source = source or (file.source if file else "")
+        from copsense.cli.criterion_options import read_criteria
+        from copsense.cli.limit_options import read_limits
+        from copsense.robots import save_stance
+
+        given: dict[str, Any] = click.get_current_context().params
+        criteria = ()
+        if "criteria" in given:
+            criteria = read_criteria(given["criteria"], given["characteristic_length"])  # type: ignore[assignment]
+        save_stance(
+            stance,
+            path,
+            robot=source,
+            package_dirs=package_dirs,
+            limits=read_limits(given.get("limits")),
+            criteria=criteria,
+            overwrite=overwrite,
+        )
+        click.echo(f"written: {path}", err=True)
+    return stance

@@ -1,0 +1,82 @@
+"""Freedom: what the contacts of a stance hold fast, and the joints that a limb lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from copsense.contact import Contact
+from copsense.stance import RANK_TOLERANCE, Stance
+
+_AXES = (
+    "along x",
+    "along y",
+    "along z",
+    "about x (roll)",
+    "about y (pitch)",
+    "about z (yaw)",
+)
+_STILL = 1e-4  # m, per unit of motion: what moves the CoM less leaves it where it is
+_SHARE = 0.01  # share of a lost direction from which a rotation is said to be missing
+
+
+def held_com_axes(stance: Stance) -> tuple[int, ...]:
+    """Axes 0..2 of the world along which no motion moves the centre of mass."""
+    speeds = stance.com_jacobian @ stance.admissible_motions
+    still = np.linalg.norm(speeds, axis=1) < _STILL
+    return tuple(int(axis) for axis in np.flatnonzero(still))
+
+
+def missing_joints(stance: Stance) -> tuple[str, ...]:
+    """What limbs with too few joints cannot do, a clause for each kind; empty where none lacks any.
+
+    A joint about the named axis of the contact frame would free it.
+    """
+    if stance.closures is not None:
+        return ()  # a loop's joints do not move alone
+    limbs: dict[str, list[str]] = {}
+    for contact in stance.contacts:
+        lacks, count = _lacking(stance, contact), len(stance.limb(contact))
+        free = len(contact.components)
+        if lacks and count < free:
+            why = f"{count} joints where {free} place it freely, none {' or '.join(lacks)}"
+            limbs.setdefault(why, []).append(contact.name)
+    return tuple(
+        f"the limb of {' and that of '.join(names)} {'has' if len(names) == 1 else 'have'} {why}"
+        for why, names in limbs.items()
+    )
+
+
+def freedom_notes(stance: Stance) -> tuple[str, ...]:
+    """What the contacts hold twice, or hold that one would expect to move; empty where nothing."""
+    rows = len(stance.constraints)
+    if stance.rank == rows:
+        return ()
+    held = [f"CoM's {'xyz'[axis]}" for axis in held_com_axes(stance) if axis < 2]
+    still = f"; they hold the {' and '.join(held)} fast" if held else ""
+    why = "; ".join(missing_joints(stance))
+    return (
+        f"The contacts hold {stance.rank} of {rows} directions: {rows - stance.rank} of them "
+        f"{'is' if rows - stance.rank == 1 else 'are'} held twice, by forces that the motors do "
+        f"not feel{still}." + (f" {why[0].upper()}{why[1:]}." if why else ""),
+    )
+
+
+def _lacking(stance: Stance, contact: Contact) -> list[str]:
+    """Axes of a contact frame along or about which its limb cannot move it, rotations first."""
+    model, rows = stance.robot.model, stance.rows[stance.contact_names.index(contact.name)]
+    columns = [
+        model.joints[i].idx_v + k for i in stance.limb(contact) for k in range(model.joints[i].nv)
+    ]
+    u, s, _ = np.linalg.svd(stance.jacobian[rows][:, columns])
+    lost = u[:, int(np.sum(s > RANK_TOLERANCE)) :]
+    named: list[int] = []
+    while lost.shape[1]:
+        shares = np.sum(lost**2, axis=1)
+        turns = [i for i, c in enumerate(contact.components) if c > 2]
+        best = max(turns, key=lambda i: shares[i]) if turns else 0
+        if not turns or shares[best] < _SHARE:
+            best = int(np.argmax(shares))
+        named.append(contact.components[best])
+        # A joint there would leave what has no part in it.
+        lost = lost @ np.linalg.svd(lost[best : best + 1])[2][1:].T
+    return [_AXES[axis] for axis in sorted(named, reverse=True)]

@@ -1,0 +1,155 @@
+"""Heading: which way a robot faces at rest, and which way up its base is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.robot import Robot
+from copsense.robots.feet import Foot
+
+_PLAIN = 1.5  # an axis says what is up when it is so much longer than the base's z
+_CLEAR = 0.4  # of the limbs' reach: how far off their ends' middle has to be to say what is up
+_AHEAD = 0.05  # of its length: a sole set off less from its ankle does not say where ahead is
+_TURNS = {  # axis of the base that is up -> roll, pitch, yaw [deg] that turn it there
+    (0, 1): (0.0, -90.0, 0.0),
+    (0, -1): (0.0, 90.0, 0.0),
+    (1, 1): (90.0, 0.0, 0.0),
+    (1, -1): (-90.0, 0.0, 0.0),
+    (2, -1): (180.0, 0.0, 0.0),
+}
+
+
+def upright_base(robot: Robot, q: Float[np.ndarray, " nq"]) -> tuple[float, float, float]:
+    """Roll, pitch, yaw [deg] that put the limbs' ends under the centre of mass; zeros if they are.
+
+    Args:
+        robot: the robot, with a free base.
+        q: a configuration, the base not turned.
+    """
+    model, data = robot.model, robot.model.createData()
+    com = np.array(pin.centerOfMass(model, data, q))
+    ends = [i for i in range(2, model.njoints) if len(model.subtrees[i]) == 1]
+    if not ends:
+        return (0.0, 0.0, 0.0)
+    # A limb counts once, however many fingers it has.
+    limbs: dict[int, list[Float[np.ndarray, " 3"]]] = {}
+    for i in ends:
+        limbs.setdefault(int(model.supports[i][2]), []).append(data.oMi[i].translation)
+    up = com - np.mean([np.mean(places, axis=0) for places in limbs.values()], axis=0)
+    axis = int(np.argmax(np.abs(up)))
+    sign = 1 if up[axis] > 0 else -1
+    if (axis, sign) == (2, 1) or (axis != 2 and abs(up[axis]) < _PLAIN * abs(up[2])):
+        return (0.0, 0.0, 0.0)
+    reach = max(float(np.linalg.norm(data.oMi[i].translation - com)) for i in ends)
+    if abs(up[axis]) < _CLEAR * reach:
+        return (0.0, 0.0, 0.0)  # limbs to all sides
+    return _TURNS[axis, sign]
+
+
+def facing(
+    robot: Robot, q: Float[np.ndarray, " nq"], feet: tuple[Foot, ...]
+) -> tuple[float | None, str]:
+    """Heading [deg, counter-clockwise from the world's x] at a configuration, and how it is known.
+
+    None where nothing says it. Feet stand beside each other, and soles reach ahead of the ankles.
+    """
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    soles = [foot for foot in feet if foot.sole is not None]
+    if not soles:
+        return None, "its feet have no soles to tell by"
+    ahead = np.mean([(f.middle - data.oMi[f.joint].translation)[:2] for f in soles], axis=0)
+    plain = _AHEAD * max(max(foot.sole.size) for foot in soles if foot.sole is not None)
+    why = "its soles reach ahead of the ankles"
+    aside = (soles[-1].middle - soles[0].middle)[:2]
+    if len(soles) == 2 and np.linalg.norm(aside) > plain:
+        across = np.array([-aside[1], aside[0]]) / np.linalg.norm(aside)
+        along = float(across @ ahead)
+        ahead = across * along
+        if abs(along) < plain:
+            # Forward rather than backward, left rather than right.
+            ahead = across if across @ (1.0, 0.1) > 0 else -across
+            why = "its feet stand beside each other; its soles do not tell ahead from behind"
+    elif np.linalg.norm(ahead) < plain:
+        return None, "its soles reach as far behind the ankles as ahead of them"
+    angle = np.degrees(np.arctan2(ahead[1], ahead[0]))
+    return float(np.round(angle / 90.0) * 90.0) % 360.0, why
+
+
+def straight_legs(
+    robot: Robot, q: Float[np.ndarray, " nq"], feet: tuple[Foot, ...], heading: float
+) -> tuple[tuple[str, ...], ...]:
+    """Hip, knee and ankle of each leg (no ankle over a point) whose knee is straight."""
+    legs = []
+    for foot in feet:
+        leg = _pitch_joints(robot, q, foot, heading)
+        if leg is not None and _knee_angle(robot, q, leg, foot) < np.radians(15.0):
+            legs.append(tuple(leg))
+    return tuple(legs)
+
+
+def bent_knees(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    legs: tuple[tuple[str, ...], ...],
+    heading: float,
+    bend: float,
+) -> dict[str, float]:
+    """Joint -> position [rad] that bends straight knees, ahead where their ranges allow it."""
+    lower, upper = robot.position_limits
+    posture: dict[str, float] = {}
+    for leg in legs:
+        signs = [_sign(robot, q, joint, heading) for joint in leg]
+        shares = (-bend / 2, bend, -bend / 2)[: len(leg)]
+        here = [robot.joint_position(q, joint) for joint in leg]
+        found = {}
+        for way in (1.0, -1.0):
+            found = {
+                joint: at + way * sign * share
+                for joint, at, sign, share in zip(leg, here, signs, shares, strict=True)
+            }
+            index = [robot.velocity_index(joint) - robot.base_nv for joint in leg]
+            if all(lower[i] <= found[j] <= upper[i] for i, j in zip(index, leg, strict=True)):
+                posture |= found
+                break
+    return posture
+
+
+def _pitch_joints(
+    robot: Robot, q: Float[np.ndarray, " nq"], foot: Foot, heading: float
+) -> list[str] | None:
+    """The last joints of a leg that turn about the lateral axis: hip, knee (and ankle)."""
+    names = [robot.model.names[i] for i in robot.model.supports[foot.joint] if i > 1]
+    pitch = [name for name in names if abs(_axis(robot, q, name, heading)) > 0.8]
+    need = 3 if foot.kind == "surface" else 2
+    return pitch[-need:] if len(pitch) >= need else None
+
+
+def _axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:
+    """Part of a joint's axis along the robot's left; zero for a joint of another kind."""
+    i = robot.model.getJointId(joint)
+    if robot.model.joints[i].nv != 1 or robot.joint_unit(joint) != "rad":
+        return 0.0
+    data = robot.model.createData()
+    jacobian = pin.computeJointJacobian(robot.model, data, q, i)
+    pin.forwardKinematics(robot.model, data, q)
+    turn = data.oMi[i].rotation @ jacobian[3:, robot.model.joints[i].idx_v]
+    left = np.array([-np.sin(np.radians(heading)), np.cos(np.radians(heading)), 0.0])
+    return float(turn @ left)
+
+
+def _sign(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:
+    return 1.0 if _axis(robot, q, joint, heading) > 0 else -1.0
+
+
+def _knee_angle(robot: Robot, q: Float[np.ndarray, " nq"], leg: list[str], foot: Foot) -> float:
+    """Angle [rad] between thigh and shin."""
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    places = [data.oMi[robot.model.getJointId(joint)].translation for joint in leg]
+    end = places[2] if len(leg) == 3 else foot.middle
+    thigh, shin = places[1] - places[0], end - places[1]
+    cosine = thigh @ shin / max(float(np.linalg.norm(thigh) * np.linalg.norm(shin)), 1e-12)
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

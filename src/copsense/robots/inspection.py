@@ -1,0 +1,263 @@
+"""Inspection: what a robot is, where its feet are, and how it is made to stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from copsense.json_data import json_data
+from copsense.robot import PLACEHOLDER_EFFORT, Robot
+from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
+from copsense.robots.contact_soles import tip_text
+from copsense.robots.feet import Foot, find_feet
+from copsense.robots.heading import bent_knees, facing, straight_legs, upright_base
+from copsense.robots.presets import PRESETS
+from copsense.robots.standing import load_robot, rest_positions
+from copsense.shapes import Geometry
+
+_UPRIGHT = 0.9  # z of the base's z axis from which it is as good as up
+_BENDS = (30.0, 15.0, 60.0)  # deg, of a straight knee
+
+
+@dataclass(frozen=True)
+class InspectedJoint:
+    """A degree of freedom behind the base.
+
+    Attributes:
+        name: of the joint.
+        unit: of its position, ``"rad"`` or ``"m"``.
+        lower: its lowest position; -inf where there is no limit.
+        upper: its highest.
+        motor: whether a motor of its own moves it.
+        effort: the motor's largest torque [Nm, or N]; inf where the file has no number for it.
+        placeholder: the number that stands in the file for no limit, or None.
+        spring: stiffness of its spring [Nm/rad, or N/m], or None.
+        follows: the joint that it follows, or None.
+    """
+
+    name: str
+    unit: Literal["rad", "m"]
+    lower: float
+    upper: float
+    motor: bool
+    effort: float
+    placeholder: float | None
+    spring: float | None
+    follows: str | None
+
+    def __str__(self) -> str:
+        """One line: range, motor, spring, what it follows."""
+        scale, unit = (1e3, "mm") if self.unit == "m" else (180 / np.pi, "deg")
+        spans = np.isfinite([self.lower, self.upper]).any()
+        low, high = self.lower * scale, self.upper * scale
+        span = f"{low:8.1f} .. {high:6.1f} {unit}" if spans else "without end"
+        force = "N" if self.unit == "m" else "Nm"
+        drive = f"{self.effort:g} {force}" if np.isfinite(self.effort) else "no effort limit"
+        if self.placeholder is not None:
+            drive += f" ({self.placeholder:g} in the file is a placeholder)"
+        drive = drive if self.motor else "no motor"
+        spring = "" if self.spring is None else f", spring {self.spring:g} {force}/{self.unit}"
+        follows = "" if self.follows is None else f", follows {self.follows}"
+        return f"{span:26}  {drive}{spring}{follows}"
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What `inspect_robot` found.
+
+    Attributes:
+        robot: the robot.
+        joints: its degrees of freedom behind the base.
+        feet: the links that it reaches lowest with.
+        heading: which way it faces [deg, counter-clockwise from the world's x, the base as the
+            line turns it up], or None where nothing says it.
+        heading_reason: how that is known.
+        line: how it stands, or None.
+        reason: why it does not stand, or "".
+        notes: what was dropped, repaired or doubted, a sentence each.
+    """
+
+    robot: Robot
+    joints: tuple[InspectedJoint, ...]
+    feet: tuple[Foot, ...]
+    heading: float | None
+    heading_reason: str
+    line: AnalyseLine | None
+    reason: str
+    notes: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """As plain data [kg, m, rad, Nm]; the heading in degrees."""
+        robot = self.robot
+        return json_data(
+            {
+                "name": robot.name,
+                "mass": robot.mass,
+                "gravity": robot.model.gravity.linear.tolist(),
+                "joints": [vars(joint) for joint in self.joints],
+                "motors": list(robot.torque_names),
+                "loops": [loop.name for loop in robot.drives.loops],
+                "heading_deg": self.heading,
+                "feet": [
+                    {
+                        "frame": foot.frame,
+                        "kind": foot.kind,
+                        "size": None if foot.sole is None else list(foot.sole.size),
+                        "height": None if foot.sole is None else foot.sole.height,
+                        "tilt": None if foot.sole is None else foot.sole.tilt,
+                        "polygon": None if foot.sole is None else foot.sole.polygon.tolist(),
+                        "x_axis": foot.contact.rotation[:, 0].tolist(),
+                        "z_axis": foot.contact.rotation[:, 2].tolist(),
+                    }
+                    for foot in self.feet
+                ],
+                "notes": list(self.notes),
+                "analyse": None if self.line is None else str(self.line),
+                "reason": self.reason or None,
+            }
+        )
+
+    def __str__(self) -> str:
+        """Mass, joints, feet, notes, and the line to paste."""
+        robot = self.robot
+        gravity = ", ".join(f"{g:g}" for g in robot.model.gravity.linear)
+        width = max((len(joint.name) for joint in self.joints), default=0)
+        lines = [
+            f"{robot.name}: {robot.mass:.4g} kg, gravity ({gravity}) m/s^2, "
+            f"{len(self.joints)} joints, {len(robot.torque_names)} motors",
+            *(f"  {joint.name:{width}}  {joint}" for joint in self.joints),
+            *(f"  loop {loop.name} ({loop.kind})" for loop in robot.drives.loops),
+            "lowest at rest:" if self.feet else "lowest at rest: nothing was found",
+            *(f"  {foot}{_axes(foot)}" for foot in self.feet),
+            "faces: " + _facing(self.heading, self.heading_reason),
+        ]
+        lines += [f"note: {note}" for note in self.notes]
+        if self.line is None:
+            lines.append(f"no line by which it stands: {self.reason}")
+        else:
+            lines += ["to analyse it:", f"  {self.line}"]
+        return "\n".join(lines)
+
+
+def inspect_robot(
+    source: str | Path | Robot, *, package_dirs: Iterable[str | Path] = (), root: str | None = None
+) -> Inspection:
+    """Inspect a robot: its joints and motors, the feet found by geometry, and how it stands.
+
+    Args:
+        source: a preset's name, the path of a URDF or MJCF, or a `Robot`.
+        package_dirs: folders that hold the packages of ``package://`` meshes.
+        root: body of the robot that is meant, where an MJCF holds several.
+
+    Raises:
+        CopsenseError: the robot cannot be loaded.
+    """
+    folders = tuple(map(str, package_dirs))
+    robot = load_robot(source, package_dirs=folders, root=root)
+    named = str(source)
+    if isinstance(source, Robot):
+        path = None if source.description is None else source.description.path
+        named = "ROBOT" if path is None else str(path)
+    joints = _joints(robot)
+    rest = robot.configuration(rest_positions(robot))
+    turn = _base_turn(robot, rest)
+    q = _turned(robot, rest, turn)
+    feet, notes = find_feet(robot, q, "collision")
+    soles: Geometry = "collision"
+    if not any(foot.sole is not None or foot.kind == "point" for foot in feet):
+        drawn, said = find_feet(robot, q, "visual") if robot.mjcf is None else ((), ())
+        if any(foot.sole is not None or foot.kind == "point" for foot in drawn):
+            feet, soles, notes = drawn, "visual", said
+            notes += (
+                "no collision geometry was found under its feet; what is drawn is read instead "
+                "(--soles visual).",
+            )
+    heading, why = facing(robot, q, feet)
+    if named in PRESETS:
+        line: AnalyseLine | None = AnalyseLine(named)
+        return Inspection(robot, joints, feet, heading, why, line, "", (*robot.notes, *notes))
+    if any(foot.kind == "surface" and foot.sole is None for foot in feet):
+        notes += (
+            "no sole can be read under its feet: the rectangle of --sole is a guess. Measure it: "
+            "X0:X1:Y0:Y1 in the frame's axes [m].",
+        )
+    legs = straight_legs(robot, q, feet, heading or 0.0)
+    bent: list[dict[str, float]] = [
+        bent_knees(robot, q, legs, heading or 0.0, np.radians(bend)) for bend in _BENDS if legs
+    ]
+    rpy = (turn[0], turn[1], (360.0 - (heading or 0.0)) % 360.0)
+    lines = lines_to_try(named, feet, soles, rpy, [*bent, {}], folders)
+    found, reason, said = first_that_stands(robot, lines)
+    if found is None:  # else it was said when the robot stood
+        said = tuple(tip_text(f.contact, f.sole) for f in feet if f.sole and f.sole.is_tip)
+    notes += tuple(note for note in said if note not in notes)
+    return Inspection(robot, joints, feet, heading, why, found, reason, (*robot.notes, *notes))
+
+
+def _base_turn(robot: Robot, rest: Float[np.ndarray, " nq"]) -> tuple[float, float, float]:
+    """Roll and pitch [deg] that put the base upright: as the file has it, or by its limbs."""
+    if robot.base_nv != 6:
+        return (0.0, 0.0, 0.0)
+    written = None if robot.mjcf is None else robot.mjcf.base
+    if written is not None and written[2, 2] < _UPRIGHT:
+        roll, pitch, _ = np.degrees(pin.rpy.matrixToRpy(written)).round(2) + 0.0
+        return (float(roll), float(pitch), 0.0)
+    return upright_base(robot, rest)
+
+
+def _joints(robot: Robot) -> tuple[InspectedJoint, ...]:
+    lower, upper = robot.position_limits
+    motors = dict(zip(robot.torque_names, robot.effort_limits.tolist(), strict=True))
+    follows = {coupling.joint: coupling.of for coupling in robot.drives.couplings}
+    raw = np.asarray(robot.model.upperEffortLimit)[robot.base_nv :]
+    found = []
+    for i, name in enumerate(robot.dof_names):
+        spring = robot.drives.springs.get(name)
+        placeholder = PLACEHOLDER_EFFORT <= raw[i] < np.inf
+        found.append(
+            InspectedJoint(
+                name,
+                "m" if robot.dof_units[i] == "m" else "rad",
+                float(lower[i]),
+                float(upper[i]),
+                name in motors,
+                motors.get(name, np.inf),
+                float(raw[i]) if placeholder else None,
+                None if spring is None else spring.stiffness,
+                follows.get(name),
+            )
+        )
+    return tuple(found)
+
+
+def _turned(
+    robot: Robot, q: Float[np.ndarray, " nq"], rpy: tuple[float, float, float]
+) -> Float[np.ndarray, " nq"]:
+    turned = np.array(q)
+    if any(rpy):
+        turned[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(*np.radians(rpy))).coeffs()
+    return turned
+
+
+def _axes(foot: Foot) -> str:
+    """Axes of a turned contact in words, or nothing."""
+    if foot.sole is None or np.array_equal(foot.contact.rotation, np.eye(3)):
+        return ""
+    names = [
+        "+-"[int(axis[np.argmax(np.abs(axis))] < 0)] + "xyz"[int(np.argmax(np.abs(axis)))]
+        for axis in foot.contact.rotation.T
+    ]
+    return f"; its x, y, z are the frame's {', '.join(names)}"
+
+
+def _facing(heading: float | None, reason: str) -> str:
+    if heading is None:
+        return f"taken as +x, for {reason}"
+    known = {0.0: "+x", 90.0: "+y", 180.0: "-x", 270.0: "-y"}
+    return f"{known[heading]} of the world at rest, for {reason}"

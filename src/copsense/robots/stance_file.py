@@ -1,0 +1,289 @@
+"""Stance file: a stance written down in TOML, units in its keys, to be repeated anywhere.
+
+    robot = "g1.urdf"                   # a preset, or a file seen from this one
+    [posture_deg]
+    l_knee = 40.0
+    [[contacts]]
+    frame = "l_foot"
+
+stands up as `load_stance` would. What `save_stance` writes has the exact ``[configuration]``
+instead, and whole contacts, and is not solved again.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomli_w
+
+from copsense.arrays import finite_array, finite_number
+from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError
+from copsense.files import check_output, write_beside
+from copsense.loads import Load, SpringLoad
+from copsense.robot import Robot
+from copsense.robots.presets import PRESETS
+from copsense.robots.stance_tables import (
+    configuration_data,
+    contact_data,
+    drives_data,
+    known,
+    list_of,
+    load_data,
+    read_configuration,
+    read_contact,
+    read_drives,
+    read_loads,
+    read_payload,
+    read_posture,
+    table_of,
+)
+from copsense.stance import Stance
+
+if TYPE_CHECKING:
+    from copsense.criterion import Criterion
+    from copsense.limits import Limits
+
+_KEYS = (
+    "robot",
+    "package_dirs",
+    "locked",
+    "contact_at",
+    "width_m",
+    "base_rpy_deg",
+    "posture_deg",
+    "posture_rad",
+    "posture_m",
+    "configuration",
+    "contacts",
+    "loads",
+    "spring_loads",
+    "payloads",
+    "drives",
+    "limits",
+    "criteria",
+)
+_SAME = 1e-12  # of an inertia: what reading a file twice may differ by
+
+
+@dataclass(frozen=True, eq=False)
+class StanceFile:
+    """What a stance file says.
+
+    Attributes:
+        path: of the file.
+        data: its tables.
+    """
+
+    path: Path
+    data: Mapping[str, Any]
+
+    @classmethod
+    def read(cls, path: str | Path) -> StanceFile:
+        """Read a file.
+
+        Raises:
+            ModelLoadError: no such file, or not TOML.
+            UnknownNameError: a key that a stance file does not have.
+        """
+        where = Path(path)
+        try:
+            data = tomllib.loads(where.read_text(encoding="utf-8-sig"))
+        except OSError as error:
+            raise ModelLoadError(
+                f"the stance file {where} cannot be read: {error.strerror}. Give a .toml file that "
+                "copsense.robots.save_stance or --save-stance wrote."
+            ) from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ModelLoadError(f"{where} is not TOML: {error}. Correct the file.") from None
+        known(data, _KEYS, "a stance file")
+        if not isinstance(data.get("robot"), str):
+            raise InvalidInputError(
+                f'the stance file {where} names no robot. Write, say, robot = "icub", or the path '
+                "of a URDF or MJCF from the file's own folder."
+            )
+        return cls(where, data)
+
+    @property
+    def source(self) -> str | Path:
+        """The robot: a preset's name, or a path as seen from here."""
+        robot = str(self.data["robot"])
+        return robot if robot in PRESETS else self.path.parent / robot
+
+    @property
+    def limits(self) -> Limits | None:
+        """The limits in the file, or None where it has none."""
+        from copsense.limits import Limits
+
+        if "limits" not in self.data:
+            return None
+        table = table_of(self.data["limits"], "limits")
+        return Limits.from_dict({k: None if v == "off" else v for k, v in table.items()})
+
+    @property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """The criteria in the file; none where it has none."""
+        from copsense.criterion import Criterion, criterion_named
+
+        return tuple(
+            criterion_named(each) if isinstance(each, str) else Criterion.from_dict(each)
+            for each in list_of(self.data.get("criteria", []), "criteria")
+        )
+
+    def stance(self) -> Stance:
+        """The stance.
+
+        Raises:
+            CopsenseError: anything wrong with what the file says; the message names the file.
+        """
+        try:
+            return self._stance()
+        except CopsenseError as error:
+            error.add_note(f"(in the stance file {self.path})")
+            raise
+
+    def _stance(self) -> Stance:
+        from copsense.posture import carry_payload
+        from copsense.robots.standing import load_robot, load_stance
+
+        data = self.data
+        folders = [self.path.parent / str(each) for each in data.get("package_dirs", [])]
+        contacts = [
+            read_contact(table_of(each, "contacts"))
+            for each in list_of(data.get("contacts", []), "contacts")
+        ]
+        robot = load_robot(
+            self.source, package_dirs=folders, frames=[contact.frame for contact in contacts]
+        )
+        if "drives" in data:
+            robot = robot.with_drives(read_drives(table_of(data["drives"], "drives")))
+        if "locked" in data:
+            locked = set(map(str, data["locked"]))
+            for joint in locked:
+                robot.joint_id(joint)
+            robot = robot.keeping(joint for joint in robot.joint_names if joint not in locked)
+        payloads = [read_payload(each) for each in list_of(data.get("payloads", []), "payloads")]
+        loads = read_loads(data)
+        if "configuration" in data:
+            for payload in payloads:
+                robot = robot.with_payload(**payload)
+            q = read_configuration(robot, table_of(data["configuration"], "configuration"))
+            return Stance(robot, q, tuple(contacts), loads=tuple(loads))
+        preset = isinstance(self.source, str) and not {"drives", "locked"} & set(data)
+        rpy = data.get("base_rpy_deg")
+        stance = load_stance(
+            self.source if preset else robot,
+            contacts=contacts or None,
+            posture=read_posture(data),
+            base_rpy=None if rpy is None else np.radians(finite_array(rpy, "base_rpy_deg", (3,))),
+            width=None if "width_m" not in data else finite_number(data["width_m"], "width_m"),
+            contact_at=data.get("contact_at"),
+            package_dirs=folders,
+        )
+        for payload in payloads:
+            stance = carry_payload(stance, payload["frame"], payload["mass"], com=payload["com"])
+        return stance.with_loads(loads) if loads else stance
+
+
+def save_stance(
+    stance: Stance,
+    path: str | Path,
+    *,
+    robot: str | Path | None = None,
+    package_dirs: Iterable[str | Path] = (),
+    limits: Limits | None = None,
+    criteria: Sequence[Criterion] = (),
+    overwrite: bool = False,
+) -> None:
+    """Write a stance down: robot, contacts, configuration, loads, drives, limits, criteria.
+
+    `copsense.load_stance(path)` and ``--stance path`` read it back, to the last bit but for the
+    rounding of a quaternion.
+
+    Args:
+        stance: what to write.
+        path: a ``.toml`` file.
+        robot: the preset's name or the model's file; default where the robot came from.
+        package_dirs: folders of its meshes' packages, if it needs any.
+        limits: to be used where none are given.
+        criteria: likewise.
+        overwrite: replace a file that is there.
+
+    Raises:
+        OutputError: the file cannot be written, or is there already.
+        InvalidInputError: where the robot came from is not known, or is another robot.
+    """
+    from copsense.robots.standing import load_robot
+
+    target = check_output(path, suffixes=(".toml",), overwrite=overwrite)
+    source = _source_of(stance.robot) if robot is None else str(robot)
+    folders = [str(folder) for folder in package_dirs]
+    frames = [contact.frame for contact in stance.contacts]
+    plain = load_robot(source, package_dirs=folders, frames=frames)
+    data: dict[str, Any] = {"robot": source if source in PRESETS else _beside(source, target)}
+    if folders:
+        data["package_dirs"] = [_beside(folder, target) for folder in folders]
+    kept = set(stance.robot.joint_names)
+    locked = [joint for joint in plain.joint_names if joint not in kept]
+    if locked and kept.issubset(plain.joint_names):
+        data["locked"] = locked
+        plain = plain.keeping(kept)
+    for payload in stance.robot.payloads:
+        plain = plain.with_payload(payload.frame, payload.mass, com=payload.com)
+    if not _same_model(plain, stance.robot):
+        raise InvalidInputError(
+            f"{source} is not the robot of this stance, or that was changed since it was read: its "
+            "joints or masses differ. Give robot=, the file that holds it."
+        )
+    data["configuration"] = configuration_data(stance)
+    if stance.robot.drives or plain.drives:  # empty: none, whatever the robot's file says
+        data["drives"] = drives_data(stance.robot.drives)
+    if limits is not None:
+        table = {k: "off" if v is None else v for k, v in limits.to_dict().items()}
+        data["limits"] = table
+    if criteria:
+        data["criteria"] = [criterion.to_dict() for criterion in criteria]
+    data["payloads"] = [
+        {"frame": p.frame, "mass_kg": p.mass, "com_m": list(p.com)} for p in stance.robot.payloads
+    ]
+    data["contacts"] = [contact_data(contact) for contact in stance.contacts]
+    for key, kind in (("loads", Load), ("spring_loads", SpringLoad)):
+        data[key] = [load_data(load) for load in stance.loads if isinstance(load, kind)]
+    data = {k: v for k, v in data.items() if k == "drives" or v not in ([], {})}
+    text = tomli_w.dumps(data, multiline_strings=False)
+    write_beside(target, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def _source_of(robot: Robot) -> str:
+    if robot.name in PRESETS:
+        return robot.name
+    path = robot.description.path if robot.description else None
+    if path is None:
+        raise InvalidInputError(
+            f"robot {robot.name!r} was not read from a file, so a stance file cannot say where to "
+            "find it. Write it to a URDF or MJCF and give robot=."
+        )
+    return str(path)
+
+
+def _beside(source: str, target: Path) -> str:
+    """A path as seen from the stance file's folder, where one leads there."""
+    path, folder = Path(source).resolve(), target.resolve().parent
+    try:
+        return path.relative_to(folder, walk_up=True).as_posix()  # type: ignore[call-arg]
+    except (TypeError, ValueError):  # walk_up is of Python 3.12
+        import os
+
+        return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _same_model(one: Robot, other: Robot) -> bool:
+    a, b = one.model, other.model
+    return list(a.names) == list(b.names) and all(
+        np.allclose(x.toDynamicParameters(), y.toDynamicParameters(), rtol=_SAME, atol=_SAME)
+        for x, y in zip(a.inertias, b.inertias, strict=True)
+    )

@@ -1,0 +1,187 @@
+"""Inspection finds feet, soles and heading by geometry, and prints a line by which a robot stands.
+
+The walkers are written with known feet, axes and soles: what is found is compared with those.
+"""
+
+import json
+import shlex
+import warnings
+
+import numpy as np
+import pytest
+from support.commands import copsense
+from support.tiny import urdf as tiny
+from support.walkers import BIPED, FOUR, walker
+
+import copsense as cs
+from copsense.robots import inspect_robot, soles_read
+
+BACK = np.diag([-1.0, -1.0, 1.0])  # axes in which x is backward and y right
+SIDE = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # y forward, x right
+
+
+def written(folder, text, name="robot.urdf"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def renamed(text, **names):
+    for old, new in names.items():
+        text = text.replace(f'"{old}"', f'"{new}"')
+    return text
+
+
+def run(line):
+    """Paste the line that was printed."""
+    words = shlex.split(line)
+    assert words[:2] == ["copsense", "analyse"]
+    return copsense(*words[1:], "--json")
+
+
+def test_feet_are_found_by_geometry_under_any_name_with_their_soles(tmp_path):
+    text = renamed(walker(), l_foot="head", r_foot="left_hand", trunk="sole")
+    found = inspect_robot(written(tmp_path, text))
+    assert [foot.frame for foot in found.feet] == ["head", "left_hand"]
+    for foot in found.feet:
+        np.testing.assert_allclose(foot.sole.size, (0.2, 0.08), rtol=0, atol=1e-9)
+        assert foot.sole.height == pytest.approx(-0.05, abs=1e-9)
+        assert foot.sole.tilt == 0.0
+        assert str(foot) == f"{foot.frame}: sole 200 x 80 mm, 50 mm under the frame"
+    answer = run(str(found.line))
+    assert answer.code == 0, answer.err
+    assert "head: sole 200 x 80 mm, 50 mm under the frame; read from its collision" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("axes", "heading", "option"),
+    [(None, 0.0, None), (BACK, 180.0, "--base-yaw=180"), (SIDE, 90.0, "--base-yaw=270")],
+)
+def test_a_robot_that_faces_elsewhere_is_turned_to_face_along_x(tmp_path, axes, heading, option):
+    found = inspect_robot(written(tmp_path, walker(base=axes)))
+    assert found.heading == heading
+    if option is None:
+        assert "--base" not in str(found.line)
+    else:
+        assert option in shlex.split(str(found.line))
+    stance = _stance(found)
+    for place, sign in zip(stance.placements, (1, -1), strict=True):
+        assert sign * place.translation[1] > 0.05  # the left foot is left
+    q = stance.q
+    ahead = np.array([0.03, 0.0, 0.0])  # where a sole's middle is from its ankle
+    turned = [place.rotation.T @ ahead for place in stance.placements]
+    assert q.shape == (19,)
+    assert all(t[0] > 0.02 or axes is not None for t in turned)
+
+
+@pytest.mark.parametrize(
+    ("axes", "rpy"),
+    [
+        (np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]), "--base-rpy=-90:0:0"),
+        (np.diag([1.0, -1.0, -1.0]), "--base-rpy=180:0:0"),
+    ],
+)
+def test_a_base_whose_z_is_not_up_is_turned_by_the_line(tmp_path, axes, rpy):
+    found = inspect_robot(written(tmp_path, walker(base=axes)))
+    assert rpy in shlex.split(str(found.line))
+    answer = run(str(found.line))
+    assert answer.code == 0, answer.err
+    assert _stance(found).com[2] > 0.4
+
+
+def test_straight_knees_are_bent_ahead_unless_their_range_forbids_it(tmp_path):
+    ahead = inspect_robot(written(tmp_path, walker())).line.posture
+    assert ahead["l_knee"] > 0.2
+    assert ahead["l_hip"] == pytest.approx(-ahead["l_knee"] / 2)
+    limits = {"knee": (-2.0, 0.0)}
+    back = inspect_robot(written(tmp_path, walker(limits=limits))).line.posture
+    assert back["l_knee"] < -0.2
+    assert back["l_hip"] == pytest.approx(-back["l_knee"] / 2)
+
+
+def test_four_balls_are_points(tmp_path):
+    text = walker(legs=FOUR).replace('<box size="0.2 0.08 0.02"/>', '<sphere radius="0.02"/>')
+    assert "sphere" in text
+    found = inspect_robot(written(tmp_path, text))
+    assert [foot.kind for foot in found.feet] == ["point"] * 4
+    assert "fl_foot:point" in str(found.line)
+    assert run(str(found.line)).code == 0
+
+
+def test_a_toe_tip_under_a_foot_is_doubted_aloud(tmp_path):
+    # A foot of 200 x 80 mm, and a block of 13 x 45 mm that reaches 5 mm lower.
+    tip = (
+        '<collision><origin xyz="0.12 0 -0.05"/><geometry><box size="0.013 0.045 0.01"/>'
+        "</geometry></collision></link>"
+    )
+    parts = walker().split("</collision></link>")
+    text = f"</collision>{tip}".join(parts)
+    path = written(tmp_path, text)
+    found = inspect_robot(path)
+    doubts = [n for n in found.notes if "13 x 45 mm" in n and "tip" in n]
+    assert len(doubts) == 2
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        cs.load_stance(path, contacts=BIPED, contact_at="sole")
+    doubts = [str(each.message) for each in said if "13 x 45 mm was read" in str(each.message)]
+    assert len(doubts) == 2
+
+
+def test_visual_geometry_is_offered_where_nothing_collides(tmp_path):
+    text = walker().replace("<collision>", "<visual>").replace("</collision>", "</visual>")
+    found = inspect_robot(written(tmp_path, text))
+    assert "--soles visual" in str(found.line)
+    assert any("what is drawn is read instead" in note for note in found.notes)
+    assert [foot.sole.size for foot in found.feet] == [pytest.approx((0.2, 0.08))] * 2
+    answer = run(str(found.line))
+    assert answer.code == 0, answer.err
+    assert "read from its visual geometry" in answer.err
+
+
+def test_without_any_geometry_the_sole_is_said_to_be_a_guess(tmp_path):
+    found = inspect_robot(written(tmp_path, walker(box=False)))
+    assert [foot.frame for foot in found.feet] == BIPED
+    assert "--sole=" in str(found.line)
+    assert any("is a guess" in note for note in found.notes)
+    assert run(str(found.line)).code == 0
+
+
+def test_a_robot_that_cannot_stand_has_no_line_and_a_reason():
+    ball = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    found = inspect_robot(cs.Robot.from_urdf(tiny(ball)))
+    assert found.line is None
+    assert "two points" in found.reason
+    assert "no line by which it stands" in str(found)
+
+
+def test_the_command_prints_it_and_answers_in_json(tmp_path):
+    path = written(tmp_path, walker())
+    answer = copsense("inspect", path)
+    assert answer.code == 0
+    assert "walker: 18.6 kg" in answer.out
+    assert "12 joints, 12 motors" in answer.out
+    assert "80 Nm" in answer.out
+    data = copsense("inspect", path, "--json").json
+    assert data == json.loads(json.dumps(inspect_robot(path).to_dict()))
+    assert data["feet"][0]["size"] == pytest.approx([0.2, 0.08])
+    assert copsense("inspect", tmp_path / "none.urdf").error
+
+
+def test_a_sole_that_was_given_is_not_said_to_be_read():
+    polygon = cs.rectangle((-0.05, 0.1), (-0.04, 0.04))
+    contacts = [cs.Contact(name, polygon=polygon) for name in BIPED]
+    stance = cs.load_stance(walker(), contacts=contacts, contact_at="sole")
+    assert soles_read(stance) == ()
+    read = cs.load_stance(walker(), contacts=BIPED, contact_at="sole")
+    assert len(soles_read(read)) == 2
+
+
+def _stance(found):
+    line = found.line
+    return cs.load_stance(
+        found.robot,
+        contacts=list(line.contacts),
+        contact_at=line.contact_at,
+        posture=line.posture,
+        base_rpy=np.radians(line.base_rpy),
+    )

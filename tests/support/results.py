@@ -1,0 +1,215 @@
+"""One of every result that copsense hands out, and everything that hangs on it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
+from itertools import islice
+
+import numpy as np
+
+import copsense
+from copsense.batch import BatchKernel, PostureChart
+from copsense.comparison import ControllerChoice, PostureChoice, Rest, RobotChoice, make_plan
+from copsense.comparison.score import Score
+from copsense.controllers import BalancingController
+from copsense.controllers.target import Hold, lateral_reference
+from copsense.design import LENGTHS, families
+from copsense.errors import CopsenseError
+from copsense.labelled import LabelledResult
+from copsense.limits import limit_rows
+from copsense.load_problem import LoadProblem
+from copsense.loads import SpringLoad
+from copsense.maps import MapPlan
+from copsense.maps.map_statistics import CriterionSummary as Summary
+from copsense.maps.map_statistics import FailedPosture, MapSummary, WorstPosture
+from copsense.maps.marginals import Marginal
+from copsense.maps.sampling import Axis, Grid
+from copsense.margins import margin_table
+from copsense.path import LateralPath
+from copsense.pushes import push_limits
+from copsense.robots import PRESETS
+from copsense.scan import limit_travel, next_active_set_change
+from copsense.simulation import ModelError, Scenario
+from copsense.simulation.prediction import predict
+from copsense.sole import read_sole
+from support.driven_robots import everything, standing
+
+TORQUE, LENGTH = copsense.minimum_torque(), copsense.minimum_wrench(1.0)
+LIMITS = copsense.Limits(friction=0.33, torque="model")
+_LOOKED_AT = 2  # of many alike
+_DEEPEST = 6  # attributes of attributes
+
+
+def own_policy(q: np.ndarray) -> np.ndarray:
+    """Half of the four-bar's weight on each foot."""
+    robot = copsense.load_stance("four_bar").robot
+    wrenches = np.zeros((2, 6))
+    wrenches[:, 2] = robot.weight / 2
+    return wrenches
+
+
+def all_results(icub) -> dict[str, object]:
+    """Name -> what a function of copsense gave; small, but of every kind."""
+    robot_with_all = everything()
+    loads = (
+        copsense.Load("l_heel", (1.0, 2.0, 3.0)),
+        SpringLoad("l_heel", (0.1, 0.2, 0.3), (10.0, 5.0, 2.0)),
+    )
+    driven = standing(robot_with_all, 0.01).with_loads(loads)
+    # On the four-bar every solution is quick; the iCub has soles from meshes and many joints.
+    bar = copsense.load_stance("four_bar")
+    path = copsense.lateral_sweep(bar, -0.02, 0.02, 5)
+    within = copsense.solve_equilibrium(icub, TORQUE, LIMITS)
+    scan = copsense.PathScan(path, TORQUE)
+    y = float(bar.com[1])
+    grid = Grid((Axis("com_y", y - 0.01, y + 0.01, 2),))
+    somewhere = {"com_y": 0.01}
+    chart = PostureChart(bar, ["com_y"])
+    kernel = BatchKernel(bar, [TORQUE])
+    return {
+        "stance": icub,
+        "driven stance": driven,
+        "contact": icub.contacts[0],
+        "limits": LIMITS,
+        "rows of limits": limit_rows(icub, LIMITS),
+        "load": LoadProblem.of(icub),
+        "driven load": LoadProblem.of(driven),
+        "sole": read_sole(icub.robot, icub.contacts[0]),
+        "equilibrium": copsense.solve_equilibrium(icub, TORQUE),
+        "driven equilibrium": copsense.solve_equilibrium(driven, TORQUE),
+        "constrained equilibrium": within,
+        "rates": within.rates(icub.com_motions[:, 1]),
+        "sensitivity": copsense.cop_sensitivity(icub, LENGTH),
+        "sensitivity within limits": copsense.cop_sensitivity(icub, TORQUE, LIMITS),
+        "sensitivity of a tie-break": copsense.cop_sensitivity(
+            icub, copsense.minimum_tangential(LENGTH)
+        ),
+        "change to first order": copsense.cop_sensitivity(
+            icub, TORQUE, LIMITS
+        ).next_active_set_change(icub.com_motions[:, 1]),
+        "change": next_active_set_change(bar, TORQUE, copsense.Limits()),
+        "posture": copsense.solve_posture(icub, com=(None, 0.01, None)),
+        "path": path,
+        "path with a failure": copsense.lateral_sweep(bar, 0.0, 3.0, 2),
+        "list": copsense.path_through(bar, [bar.q]),
+        "lateral path": LateralPath(bar),
+        "scan": scan,
+        "scan point": scan.begin,
+        "travel": limit_travel(bar, TORQUE, copsense.Limits()),
+        "limit margins": margin_table(icub, LIMITS),
+        "margin": icub.contacts[0].sole.margin((0.0, 0.0)),
+        "analysis": copsense.analyse(bar, None, copsense.Limits()),
+        "regions": copsense.com_regions(icub, [LENGTH], LIMITS, tolerance=1e-2),
+        "pushes": push_limits(icub, "chest", [LENGTH], LIMITS),
+        "design": copsense.design_criterion(path, copsense.Limits(), LENGTHS, grid=2),
+        **{f"family {name}": family for name, family in families(icub).items()},
+        "sweep": copsense.sweep(path, [TORQUE]),
+        "prediction": predict(lateral_reference(icub, Hold()), TORQUE),
+        "scenario": Scenario(1.0, model_error=ModelError(payload={"chest": 2.0})),
+        "controller": BalancingController(icub, TORQUE),
+        "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),
+        "preset": PRESETS["icub"],
+        "batch": kernel.evaluate(bar.q[None]),
+        "kernel": kernel,
+        "chart": chart,
+        "chart postures": chart.solve(np.array([[y]])),
+        "plan of a map": MapPlan(bar, (TORQUE,), grid),
+        "map": MapSummary(
+            "map.zarr",
+            "four_bar",
+            ("com_y",),
+            ("m",),
+            1,
+            1,
+            1,
+            {
+                "minimum-torque": Summary(
+                    {"evaluated": 1},
+                    (WorstPosture(0, dict(somewhere), 0.1),),
+                    (),
+                    {50.0: 0.1},
+                    {50.0: 1.0},
+                    {"unreachable": FailedPosture(1, dict(somewhere), "too far")},
+                )
+            },
+        ),
+        "marginal": Marginal(
+            ("a", "b"),
+            ("m", "m"),
+            "least_com_travel",
+            "worst",
+            (np.zeros(3), np.zeros(41)),
+            ("minimum-torque",),
+            np.zeros((1, 2, 40)),
+        ),
+        "case": make_plan(
+            [RobotChoice("icub", soles={"l_sole": (-0.1, 0.1, -0.03, 0.03)})],
+            [PostureChoice("bent", joints={"l_knee": 0.1})],
+            [ControllerChoice()],
+            [Rest()],
+        )[0],
+        "score": Score("tip_excursion", "measured", 0.05),
+    }
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something that hangs on a result.
+
+    Attributes:
+        where: the way to it.
+        value: itself.
+        again: what the same way leads to when it is asked a second time.
+    """
+
+    where: str
+    value: object
+    again: object
+
+
+def parts(where: str, value: object) -> Iterator[Part]:
+    """A result and all that its public attributes hold, whatever is of copsense taken apart."""
+    seen: set[int] = set()
+    keep = []  # or a new object might get the address of one that is gone
+    todo = [Part(where, value, value)]
+    while todo:
+        part = todo.pop()
+        if id(part.value) in seen:
+            continue
+        seen.add(id(part.value))
+        keep.append(part)
+        yield part
+        if part.where.count(".") < _DEEPEST:
+            todo += _inside(part)
+
+
+def _inside(part: Part) -> list[Part]:
+    value, again = part.value, part.again
+    if isinstance(value, Mapping) and not is_dataclass(value):
+        found = list(islice(value.items(), _LOOKED_AT))
+        return [Part(f"{part.where}[{k!r}]", each, again[k]) for k, each in found]
+    if isinstance(value, tuple | list):
+        found = list(islice(enumerate(value), _LOOKED_AT))
+        return [Part(f"{part.where}[{k}]", each, again[k]) for k, each in found]
+    if not type(value).__module__.startswith("copsense.") or isinstance(value, LabelledResult):
+        return []  # a recording has recordings, of its parts, without end
+    names = [f.name for f in fields(value)] if is_dataclass(value) else list(_own(value))
+    names += [
+        name
+        for kind in type(value).__mro__
+        for name, held in vars(kind).items()
+        if isinstance(held, property | cached_property)
+    ]
+    found = []
+    for name in dict.fromkeys(names):
+        if name.startswith("_"):
+            continue
+        try:
+            found.append(Part(f"{part.where}.{name}", getattr(value, name), getattr(again, name)))
+        except CopsenseError:
+            continue
+    return found
+
+
+def _own(value: object) -> Iterator[str]:
+    return iter(vars(value) if hasattr(value, "__dict__") else ())
