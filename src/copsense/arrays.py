@@ -15,7 +15,7 @@ Array = TypeVar("Array", bound=np.ndarray)
 
 def read_only(array: Array) -> Array:
     """The same array, which can no longer be written to."""
-    array.flags.writeable = False
+    array.setflags(write=False)
     return array
 
 

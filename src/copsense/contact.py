@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.arrays import finite_array
+from copsense.arrays import finite_array, read_only
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
 from copsense.polygon import Polygon
@@ -151,6 +151,14 @@ class Contact(ShortRepr):
             return None
         return Polygon(self.polygon)
 
+    @cached_property
+    def edge_rows(self) -> Float[np.ndarray, "e 6"]:
+        """Row of each edge of the sole: times the contact's wrench, f_z (b - a . p) [N m]."""
+        if self.sole is None:
+            return read_only(np.zeros((0, 6)))
+        edges = zip(self.sole.normals, self.sole.offsets, strict=True)
+        return read_only(np.array([edge_row(a, b) for a, b in edges]))
+
     def on(self, robot: Robot) -> Attachment:
         """Where on a robot the contact is.
 
@@ -160,6 +168,16 @@ class Contact(ShortRepr):
         frame = robot.frame(self.frame)
         offset = pin.SE3(self.rotation, np.array(self.offset))
         return Attachment(int(frame.parentJoint), frame.placement * offset)
+
+
+def edge_row(normal: Float[np.ndarray, " 2"], offset: float) -> Float[np.ndarray, " 6"]:
+    """The row that gives f_z (b - a . p) of a wrench, with f_z p = (-m_y, m_x).
+
+    Args:
+        normal: outward normal a of an edge of the sole.
+        offset: distance b of its line from the contact frame's origin along the normal [m].
+    """
+    return np.array([0.0, 0.0, offset, -normal[1], normal[0], 0.0])
 
 
 def rectangle(

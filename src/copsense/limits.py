@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from copsense.arrays import array_property, finite_number, owned, read_only
-from copsense.contact import Contact
+from copsense.contact import Contact, edge_row
 from copsense.content import ByContent, ShortRepr, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
@@ -200,6 +200,15 @@ class LimitRows(ShortRepr):
         """The kind of each row of `over_forces` (r + k,)."""
         return self.kinds + ("torque",) * len(self.joint)
 
+    def excess(self, problem: LoadProblem, forces: Float[np.ndarray, " m"]) -> float:
+        """By how much forces exceed the limit that they exceed most [N, Nm]; negative within all.
+
+        The largest of A f - b of `over_forces`, without its rows.
+        """
+        contacts = self.matrix.dot(forces[: self.matrix.shape[1]]) - self.bound
+        torques = np.abs(problem.torques(forces)) - self.torque
+        return max(float(contacts.max(initial=-np.inf)), float(torques.max(initial=-np.inf)))
+
     def over_forces(
         self, problem: LoadProblem
     ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:
@@ -360,10 +369,7 @@ def _cop_rows(contact: Contact, sole: Polygon, margin: float) -> list[Row]:
         beside = np.array([a @ sole.vertices[0] for a in sides.normals])
         names = [f"the {sides.side(i)} side" for i in range(2)]
         edges += zip(sides.normals, beside, names, strict=True)
-    return [
-        ("cop", f"CoP at {name}", np.array([0.0, 0.0, -b, a[1], -a[0], 0.0]), 0.0)
-        for a, b, name in edges
-    ]
+    return [("cop", f"CoP at {name}", -edge_row(a, b), 0.0) for a, b, name in edges]
 
 
 def _require_room(contact: Contact, sole: Polygon, margin: float) -> None:

@@ -227,18 +227,21 @@ class Polygon:
 
     def clip(self, normal: Float[np.ndarray, " 2"], offset: float) -> Polygon:
         """The part where normal p <= offset."""
-        corners, beyond = self.vertices, self.vertices @ normal - offset
-        kept: list[np.ndarray] = []
-        for j in range(len(corners)):
+        beyond = (self.vertices @ normal - offset).tolist()
+        if max(beyond, default=0.0) <= _ROUNDING:
+            return self
+        corners, kept = self.vertices.tolist(), []
+        for j, (x, y) in enumerate(corners):
             i = j - 1
             # A segment is crossed once, not there and back.
             if (i >= 0 or len(corners) > 2) and (beyond[i] > _ROUNDING) != (beyond[j] > _ROUNDING):
-                share = np.clip(beyond[i] / (beyond[i] - beyond[j]), 0.0, 1.0)
-                kept.append(corners[i] + share * (corners[j] - corners[i]))
+                share = min(max(beyond[i] / (beyond[i] - beyond[j]), 0.0), 1.0)
+                u, v = corners[i]
+                kept.append([u + share * (x - u), v + share * (y - v)])
             if beyond[j] <= _ROUNDING:
-                kept.append(corners[j])
+                kept.append([x, y])
         # A vertex on the line may be met twice.
-        once = [p for i, p in enumerate(kept) if np.any(p != kept[i - 1]) or len(kept) == 1]
+        once = [p for i, p in enumerate(kept) if p != kept[i - 1] or len(kept) == 1]
         return Polygon(np.array(once or kept[:1]).reshape(-1, 2))
 
     def section(self, axis: str, at: float) -> tuple[float, float] | None:

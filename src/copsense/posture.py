@@ -152,7 +152,7 @@ def solve_posture(
             start = rows + len(hanging)
             pull[axes] = of_h[start : start + len(axes)]
             hessian = hessian + here.curvature(-of_h[:rows], -pull / robot.mass)
-        K = np.block([[hessian, A.T], [A, np.zeros((len(A), len(A)))]])
+        K = _bordered(hessian, A)
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
             # Rates of h: one for each request, and none of what is held to second order only.
             requests = len(axes) + len(columns)
@@ -304,6 +304,16 @@ def _cost_derivatives(
         deviation[3:6] = pin.log3(relative)
         hessian[3:6, 3:6] = weights[3] * pin.Jlog3(relative)
     return weights * deviation, hessian
+
+
+def _bordered(hessian: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """[H A'; A 0]; written out, for `np.block` takes longer than the equations."""
+    n = len(hessian)
+    K = np.zeros((n + len(A), n + len(A)))
+    K[:n, :n] = hessian
+    K[n:, :n] = A
+    K[:n, n:] = A.T
+    return K
 
 
 def _independent(

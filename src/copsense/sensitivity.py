@@ -175,7 +175,7 @@ class CopSensitivity:
 
         Rows: CoP x, y in contact axes; columns: CoM x, y in world axes.
         """
-        return self.matrix.dot(self.basis.T.dot(self.com_motions))
+        return self.matrix.dot(self._com_coordinates)
 
     @array_property
     def load_gain(self) -> Float[np.ndarray, "nc 2"]:
@@ -183,8 +183,17 @@ class CopSensitivity:
 
         Columns: CoM x, y in world axes.
         """
-        along = self.basis.T.dot(self.com_motions)
-        return self.wrench_derivative[:, 2].dot(along) / self.equilibrium.stance.robot.weight
+        return self._wrench_gain[:, 2] / self.equilibrium.stance.robot.weight
+
+    @array_property
+    def _wrench_gain(self) -> Float[np.ndarray, "nc 6 2"]:
+        """Change of the wrenches per CoM travel, CoM x and y in world axes."""
+        return self.wrench_derivative.dot(self._com_coordinates)
+
+    @array_property
+    def _com_coordinates(self) -> Float[np.ndarray, "p 2"]:
+        """The motions `com_motions` in the basis."""
+        return np.asarray(self.basis.T.dot(self.com_motions))
 
     @array_property
     def unloading_travel(self) -> Float[np.ndarray, " nc"]:
@@ -235,28 +244,19 @@ class CopSensitivity:
     @cached_property
     def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
         stance = self.equilibrium.stance
+        # s = w (b - a p) is linear in the wrench: one row gives the slack and its rate.
+        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1))
+        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
+        speed = np.hypot(rate[:, 0], rate[:, 1])
+        # An edge that stands still and is passed already leaves no way back.
+        distance = np.where(slack < -_ON_EDGE, -np.inf, np.inf)
+        np.divide(slack, speed, out=distance, where=speed > _STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
-        shares = self.equilibrium.wrenches[:, 2] / stance.robot.weight
-        for k, contact in enumerate(stance.contacts):
-            if contact.sole is None:
-                continue
-            # s = w (b - a p),   ds/dCoM = (b - a p) dw/dCoM - w a' Gamma
-            a, margin = contact.sole.normals, contact.sole.distances(self.cop[k])
-            w = float(shares[k])
-            slack = w * margin
-            rate = margin[:, None] * self.load_gain[k] - w * (a @ self.com_gain[k])
-            speed = np.hypot(rate[:, 0], rate[:, 1])
-            moving = speed > _STILL
-            if moving.all():
-                distance = slack / speed
-            else:
-                distance = np.full(len(speed), np.inf)
-                np.divide(slack, speed, out=distance, where=moving)
-                # An edge that stands still and is passed already leaves no way back.
-                distance[~moving & (slack < -_ON_EDGE)] = -np.inf
-            i = int(distance.argmin())
-            if distance[i] < np.inf:
-                travel[k], edge[k] = distance[i], i
+        for k, rows in enumerate(stance.edges):
+            if rows.start < rows.stop:
+                i = int(distance[rows].argmin())
+                if distance[rows][i] < np.inf:
+                    travel[k], edge[k] = distance[rows][i], i
         return read_only(travel), read_only(edge)
 
 

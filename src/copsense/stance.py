@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
-from scipy.linalg import lapack
+from scipy.linalg import block_diag, lapack
 
 from copsense import rigid_body
 from copsense.arrays import array_property, read_only
@@ -29,6 +29,7 @@ from copsense.errors import (
 from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads, turning
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
+from copsense.row_space import RowSpace
 
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost. A
 # posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
@@ -178,6 +179,20 @@ class Stance:
         """For each row of stacked forces, its component 0..5 among (fx, fy, fz, mx, my, mz)."""
         return self._layout.component_index
 
+    @property
+    def edge_rows(self) -> Float[np.ndarray, "e k"]:
+        """Rows of the soles' edges: times wrenches (nc, 6), stacked, the edges' slacks [m].
+
+        The slack of an edge is w (b - a . p), with w the contact's share of the weight. See
+        `Contact.edge_rows`.
+        """
+        return self._layout.edge_rows
+
+    @property
+    def edges(self) -> tuple[slice, ...]:
+        """Rows of each contact in `edge_rows`, none where it has no sole."""
+        return self._layout.edges
+
     @array_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
         """Generalised gravity G(q) [N, Nm]."""
@@ -268,9 +283,9 @@ class Stance:
         return tuple(int(i) for i in self.robot.model.supports[joint] if i > 1)
 
     @cached_property
-    def _svd(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        u, s, vt = np.linalg.svd(self.constraints, full_matrices=True)
-        return u, s, vt
+    def _motions(self) -> RowSpace:
+        tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
+        return RowSpace(self.constraints, tolerance, least=1.0)
 
     @cached_property
     def hanging(self) -> tuple[int, ...]:
@@ -292,12 +307,10 @@ class Stance:
         still = np.zeros(len(self.constraints))
         return self.balance_derivative(still)[list(self.hanging)]
 
-    @cached_property
+    @property
     def rank(self) -> int:
         """Rank of `constraints`; less than its rows when contacts are redundant."""
-        singular = self._svd[1]
-        tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
-        return int(np.sum(singular > tolerance * max(1.0, singular[0])))
+        return self._motions.rank
 
     @array_property
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
@@ -306,7 +319,7 @@ class Stance:
         Without the `false_motions`, which J alone would allow. Joints that hang follow as gravity
         and their springs tell them.
         """
-        Z = self._svd[2][self.rank :].T.copy()
+        Z = self._motions.null
         count = self.false_motions.shape[1]
         if count:
             Z = Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T
@@ -338,10 +351,11 @@ class Stance:
 
     @cached_property
     def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        u, _, vt = self._svd
-        Z = vt[self.rank :].T
+        u, Z = self._motions.redundant, self._motions.null
+        if not u.shape[1]:
+            return read_only(Z[:, :0]), read_only(Z.T[:0]), read_only(np.zeros(0))
         motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
-        for y in u[:, self.rank :].T:
+        for y in u.T:
             turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
             values, vectors = np.linalg.eigh(Z.T @ (turned + turned.T) @ Z / 2)
             curved = np.abs(values) > _CURVED
@@ -393,7 +407,7 @@ class Stance:
     @property
     def redundant_directions(self) -> tuple[str, ...]:
         """Rows of stacked forces that take part in wrenches no motion can feel (J' f = 0)."""
-        null = self._svd[0][: len(self.row_names), self.rank :]
+        null = self._motions.redundant[: len(self.row_names)]
         share = np.linalg.norm(null, axis=1)
         return tuple(n for n, s in zip(self.row_names, share, strict=True) if s > 1e-6)
 
@@ -553,6 +567,8 @@ class _Layout:
         row_names: of stacked forces.
         component_index: component 0..5 of each row (m,).
         places: where each row stands among the contacts' wrenches, six numbers each (m,).
+        edge_rows: rows of the soles' edges over the contacts' wrenches, in shares of the weight.
+        edges: rows of each contact among them.
     """
 
     names: tuple[str, ...]
@@ -562,6 +578,8 @@ class _Layout:
     row_names: tuple[str, ...]
     component_index: Int[np.ndarray, " m"]
     places: Int[np.ndarray, " m"]
+    edge_rows: Float[np.ndarray, "e k"]
+    edges: tuple[slice, ...]
 
 
 @lru_cache(maxsize=32)  # a path's stances share theirs
@@ -590,15 +608,23 @@ def _layout(robot: Robot, contacts: tuple[Contact, ...]) -> _Layout:
     ends = np.cumsum([0] + [len(contact.components) for contact in contacts])
     component = np.array([i for contact in contacts for i in contact.components])
     owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
+    edges = block_diag(*(contact.edge_rows for contact in contacts)) / robot.weight
+    edge_ends = np.cumsum([0] + [len(contact.edge_rows) for contact in contacts])
     return _Layout(
         names,
         tuple(contact.on(robot) for contact in contacts),
         tuple((c.plane or Plane()).axes if c.kind == "point" else None for c in contacts),
-        tuple(slice(int(a), int(b)) for a, b in pairwise(ends)),
+        _slices(ends),
         tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in contacts for i in c.components),
         read_only(component),
         read_only(6 * owner + component),
+        read_only(edges),
+        _slices(edge_ends),
     )
+
+
+def _slices(ends: np.ndarray) -> tuple[slice, ...]:
+    return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
 
 def _check_plane(contact: Contact, foot: pin.SE3) -> None:

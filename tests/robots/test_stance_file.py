@@ -219,3 +219,22 @@ def test_a_file_and_a_robot_or_an_argument_contradict_each_other(table):
         copsense.load_stance(table, width=0.2)
     with pytest.raises(ModelLoadError, match=r"missing\.toml"):
         copsense.load_stance(table.parent / "missing.toml")
+
+
+def test_drives_that_were_taken_off_a_file_stay_off(tmp_path):
+    """Or the robot's own file would put them back without a word."""
+    legs = "".join(
+        LEG.format(n=f"leg{i}", x=x, y=y)
+        for i, (x, y) in enumerate([(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)])
+    )
+    limit = '<limit lower="-1" upper="1" effort="20" velocity="5"/></joint>'
+    mimic = legs.replace(limit, f'<mimic joint="j_leg1"/>{limit}', 1)
+    (tmp_path / "table.urdf").write_text(URDF.format(legs=mimic))
+    robot = copsense.load_robot(tmp_path / "table.urdf")
+    assert robot.drives.couplings
+    contacts = [Contact(f"leg{i}_tip", kind="point") for i in range(4)]
+    stance = copsense.load_stance(robot.with_drives(copsense.Drives()), contacts=contacts)
+    save_stance(stance, tmp_path / "stance.toml")
+    again = copsense.load_stance(tmp_path / "stance.toml")
+    assert not again.robot.drives
+    assert again.robot.torque_names == stance.robot.torque_names

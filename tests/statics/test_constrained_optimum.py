@@ -1,4 +1,4 @@
-"""Equilibria within limits are the optima that independent solvers find, on a thousand problems.
+"""Equilibria within limits are the optima that independent solvers find, on thousands of problems.
 
 clarabel solves each problem from raw data (raw_qp.py); an interior point is only good to the root
 of its gap, so it is polished onto its own active set and held against the optimality conditions.
@@ -19,7 +19,7 @@ from copsense.errors import InfeasibleError
 from copsense.limits import limit_rows
 
 ROBOTS = ("icub", "talos", "romeo", "g1", "solo12", "four_bar")
-POSTURES, PROBLEMS = 20, 10  # a robot: 1200 problems in all
+POSTURES, PROBLEMS = 35, 10  # a robot: 2100 problems in all
 SAME = 1e-9  # of the weight
 
 

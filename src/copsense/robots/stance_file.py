@@ -240,7 +240,7 @@ def save_stance(
             "joints or masses differ. Give robot=, the file that holds it."
         )
     data["configuration"] = configuration_data(stance)
-    if stance.robot.drives:
+    if stance.robot.drives or plain.drives:  # empty: none, whatever the robot's file says
         data["drives"] = drives_data(stance.robot.drives)
     if limits is not None:
         table = {k: "off" if v is None else v for k, v in limits.to_dict().items()}
@@ -253,7 +253,7 @@ def save_stance(
     data["contacts"] = [contact_data(contact) for contact in stance.contacts]
     for key, kind in (("loads", Load), ("spring_loads", SpringLoad)):
         data[key] = [load_data(load) for load in stance.loads if isinstance(load, kind)]
-    data = {key: value for key, value in data.items() if value not in ([], {})}
+    data = {k: v for k, v in data.items() if k == "drives" or v not in ([], {})}
     text = tomli_w.dumps(data, multiline_strings=False)
     write_beside(target, lambda file: file.write_text(text, encoding="utf-8"))
 

@@ -15,21 +15,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.linalg import lapack
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
+from copsense.statics.symmetric import SymmetricSystem
 
 if TYPE_CHECKING:
     from copsense.statics.equilibrium import StaticEquilibrium
 
-# Reciprocal condition number under which the KKT matrix is examined for lost directions.
-_RCOND = 1e-13
-_SOUND = 1e-5  # pivots, relative, from which the matrix is far from losing any
-_ALIKE = 1e-2  # rows whose largest entries differ by less need no scaling
 _NULL = 1e-10  # singular values, relative, that count as lost
 
 
@@ -45,21 +41,28 @@ class Kkt:
         quadratic = self.quadratic
         # Columns in the order of `Robot.by_drive`.
         J: Float[np.ndarray, "m nv"] = stance.robot.by_drive(stance.constraints.T).T
-        self.jacobian = J
         self.on: Bool[np.ndarray, " nv"] = np.concatenate(
             [np.ones(self.nb, bool), quadratic.active]
         )
         self.size: int = int(self.on.sum())
         size = self.size
-        self.matrix: Float[np.ndarray, "k k"] = np.zeros((size + len(J), size + len(J)))
-        K = self.matrix
+        K = np.zeros((size + len(J), size + len(J)))
         if size > self.nb:
             K[self.nb : size, self.nb : size] = quadratic.compliance(self.problem)
         K[size:, :size] = J if size == J.shape[1] else J[:, self.on]
         K[:size, size:] = K[size:, :size].T
         K[size:, size:] = -quadratic.wrench
+        self.system: SymmetricSystem = SymmetricSystem(K)
         self.free: Float[np.ndarray, "m z"] = np.zeros((len(J), 0))
-        self._factorise()
+        if self.system.singular:
+            # Forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers may be
+            # free too (a massless foot), which changes neither forces nor torques.
+            _, s, vt = np.linalg.svd(np.vstack([J[:, self.on].T, quadratic.wrench]))
+            self.free = vt[int(np.sum(s > _NULL * s[0])) :].T
+            # Forces of loops alone may be free: contacts and motors do not feel them.
+            if np.abs(self.free[: len(stance.row_names)]).max(initial=0.0) < _NULL:
+                self.free = self.free[:, :0]
+            self.system.use_pseudo_inverse()
         self.tie: TieBreak | None = None
         if self.free.shape[1]:
             if criterion.tie_break is None:
@@ -75,52 +78,12 @@ class Kkt:
             problem: the stance's own, or one with another base wrench or torque offset.
         """
         load = np.concatenate([problem.base_wrench, problem.torque_offset])
-        x = self.solve(np.concatenate([load[self.on], -self.quadratic.pull]))
+        x = self.system.solve(np.concatenate([load[self.on], -self.quadratic.pull]))
         if self.tie:
             x[self.size :] += self.tie.move(problem, x[self.size :])
         nu = np.zeros(len(self.on))
         nu[self.on], forces = x[: self.size], x[self.size :]
         return forces, problem.torques(forces), self.stance.robot.from_drives(nu)
-
-    def _factorise(self) -> None:
-        # Weights of any unit (1/limit^2, say) are brought to a common size first: s K s.
-        entries = np.abs(self.matrix)
-        scale = np.ones(len(entries))
-        for _ in range(3):
-            rows = scale * (entries * scale).max(axis=1)
-            if rows.min() > _ALIKE * rows.max():
-                break
-            scale /= np.sqrt(np.where(rows > 0, rows, 1.0))
-        self._scale = scale
-        scaled = scale[:, None] * self.matrix * scale
-        lu, pivots, info = lapack.dgetrf(scaled)
-        sizes = np.abs(lu.diagonal())
-        sound = info == 0 and sizes.min() > _SOUND * sizes.max()
-        if sound or (info == 0 and lapack.dgecon(lu, _norm(scaled))[0] > _RCOND):
-            self._lu, self._pinv = (lu, pivots), None
-            return
-        # Singular: forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers
-        # may be free too (a massless foot), which changes neither forces nor torques.
-        seen = np.vstack([self.jacobian[:, self.on].T, self.quadratic.wrench])
-        _, s, vt = np.linalg.svd(seen)
-        rank = int(np.sum(s > _NULL * s[0]))
-        self.free = vt[rank:].T
-        # Forces of loops alone may be free: contacts and motors do not feel them.
-        if np.abs(self.free[: len(self.stance.row_names)]).max(initial=0.0) < _NULL:
-            self.free = self.free[:, :0]
-        self._pinv = np.linalg.pinv(scaled, rcond=_NULL, hermitian=True)
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Solve, with one step of refinement; a solution of a singular consistent system."""
-        x = self._once(right)
-        return x + self._once(right - self.matrix.dot(x))
-
-    def _once(self, right: np.ndarray) -> np.ndarray:
-        scale = self._scale if right.ndim == 1 else self._scale[:, None]
-        scaled = scale * right
-        if self._pinv is not None:
-            return np.asarray(scale * (self._pinv @ scaled))
-        return np.asarray(scale * lapack.dgetrs(*self._lu, scaled)[0])
 
     def derivative(
         self, at: StaticEquilibrium, V: Float[np.ndarray, "nv p"]
@@ -128,16 +91,16 @@ class Kkt:
         """Derivatives of forces and torques along admissible velocities V."""
         stance = self.stance
         AV = stance.robot.by_drive(stance.balance_derivative(at.forces).dot(V))
-        right = np.empty((len(self.matrix), V.shape[1]))
+        right = np.empty((self.size + len(self.free), V.shape[1]))
         right[: self.size] = AV[self.on]
         if self.quadratic.inertia:
             nu = stance.robot.in_drives(at.multipliers)
             change = self.quadratic.compliance_derivative(stance, self.problem, nu)
             right[self.nb : self.size] -= change @ V
         right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
-        dx = self.solve(right)
-        if self._pinv is not None:
-            left = np.abs(self.matrix @ dx - right).max()
+        dx = self.system.solve(right)
+        if self.system.singular:
+            left = np.abs(self.system.matrix @ dx - right).max()
             if left > 1e-7 * max(1.0, np.abs(right).max()):
                 raise UndeterminedWrenchError(
                     "the contacts lose rank at this very posture (a straight leg, say): the "
@@ -193,7 +156,7 @@ class TieBreak:
         first, stance, nb = self.first, self.first.stance, self.first.nb
         H, g = self.second.over_forces(first.problem)
         W = self.second.torque_weight(first.problem)
-        x = first.solve(np.concatenate([np.zeros(first.size), g - H @ at.forces]))
+        x = first.system.solve(np.concatenate([np.zeros(first.size), g - H @ at.forces]))
         w = np.zeros(len(first.on))
         w[first.on] = x[: first.size]
         w[nb:] -= W @ at.torques
@@ -203,11 +166,6 @@ class TieBreak:
             + H @ df
         )
         return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
-
-
-def _norm(matrix: np.ndarray) -> float:
-    """The matrix's 1-norm."""
-    return float(np.abs(matrix).sum(axis=0).max())
 
 
 def _undetermined(

@@ -17,7 +17,6 @@ that where the solver's own precision is enough, in a control loop or for a line
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,13 +26,13 @@ from jaxtyping import Float, Int
 
 from copsense.content import ShortRepr
 from copsense.errors import CopsenseError, UnsolvedError
+from copsense.row_space import RowSpace
 from copsense.statics import qp
+from copsense.statics.symmetric import SymmetricSystem
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
-_WELL = 1e-4  # singular values, relative, from which no column comes near to depending on others
 _ZERO = 1e-12  # norm of a row that limits nothing
-_ALIKE = 1e-2  # rows whose largest entries differ by less need no scaling
 _FAR = 1e4  # units: no x is looked for farther out
 
 
@@ -103,24 +102,19 @@ class Program(ShortRepr):
         """Norm of each row; 1 for a row that is zero, such as the torque of a free arm."""
         return _lengths(self.A)
 
-    @cached_property
+    @property
     def null(self) -> Float[np.ndarray, "m z"]:
         """Orthonormal basis of what E' x = e leaves free."""
-        _, _, rank, v = self._svd
-        return v[rank:].T
+        return self._equations.null
 
     @cached_property
     def start(self) -> Float[np.ndarray, " m"]:
         """The smallest x with E' x = e."""
-        u, s, rank, v = self._svd
-        return np.asarray((u[:, :rank].T.dot(self.e) / s[:rank]).dot(v[:rank]))
+        return self._equations.least_solution(self.e)
 
     @cached_property
-    def _svd(self) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
-        """E' = u s v, and its rank."""
-        u, s, v = np.linalg.svd(self.E.T)
-        rank = int(np.sum(s > s.max(initial=0.0) * max(self.E.shape) * np.finfo(float).eps))
-        return u, s, rank, v
+    def _equations(self) -> RowSpace:
+        return RowSpace(self.E.T, max(self.E.shape) * np.finfo(float).eps)
 
     @cached_property
     def _reduced_cost(self) -> Float[np.ndarray, "z z"]:
@@ -191,13 +185,13 @@ class Program(ShortRepr):
         """
         columns = self._columns
         k, m = len(columns), len(self.g)
-        y = self._system(held)(np.concatenate([e[columns], -g, -b]))
+        y = self._system(held).solve(np.concatenate([e[columns], -g, -b]))
         nu = np.zeros((len(self.e), *y.shape[1:]))
         nu[columns] = y[:k]
         return y[k : k + m], nu, y[k + m :]
 
-    def _system(self, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """What solves the system with these rows held, factorised once."""
+    def _system(self, held: np.ndarray) -> SymmetricSystem:
+        """The system with these rows held, factorised once."""
         key = held.tobytes()
         if key not in self._systems:
             columns = self._columns
@@ -208,17 +202,17 @@ class Program(ShortRepr):
             K[k : k + m, k : k + m] = -self.H
             K[k + m :, k : k + m] = -self.A[held]
             K[k : k + m, k + m :] = K[k + m :, k : k + m].T
-            self._systems[key] = symmetric_solver(K)
+            self._systems[key] = SymmetricSystem(K)
         return self._systems[key]
 
     @cached_property
-    def _systems(self) -> dict[bytes, Callable[[np.ndarray], np.ndarray]]:
+    def _systems(self) -> dict[bytes, SymmetricSystem]:
         return {}
 
     @cached_property
     def _columns(self) -> np.ndarray:
         """Columns of E that do not depend on others."""
-        if self._svd[2] == self.E.shape[1] and self._svd[1][-1] > _WELL * self._svd[1][0]:
+        if self._equations.apart:
             return np.arange(self.E.shape[1])
         return _independent(self.E)
 
@@ -293,30 +287,6 @@ class Program(ShortRepr):
         if found.status != 0:
             return 0.0, np.zeros(0, dtype=int)
         return float(found.x[k]), np.flatnonzero(-found.ineqlin.marginals > 1e-9)
-
-
-def symmetric_solver(K: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """What solves K y = right (..., any number of columns), with one step of refinement.
-
-    Rows and columns are scaled alike first, so that weights of any unit may stand in K.
-    """
-    entries, d = np.abs(K), np.ones(len(K))
-    for _ in range(3):
-        size = d * (entries * d).max(axis=1)
-        if size.min() > _ALIKE * size.max():
-            break
-        d /= np.sqrt(np.where(size > 0, size, 1.0))
-    lu, pivots, _ = scipy.linalg.lapack.dgetrf(d[:, None] * K * d)
-
-    def once(right: np.ndarray) -> np.ndarray:
-        scale = d if right.ndim == 1 else d[:, None]
-        return np.asarray(scale * scipy.linalg.lapack.dgetrs(lu, pivots, scale * right)[0])
-
-    def solve(right: np.ndarray) -> np.ndarray:
-        y = once(right)
-        return y + once(right - K.dot(y))
-
-    return solve
 
 
 def _lengths(rows: np.ndarray) -> np.ndarray:

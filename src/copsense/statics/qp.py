@@ -76,7 +76,7 @@ def linear_minimum(
     cost: Float[np.ndarray, " z"], A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"]
 ) -> Float[np.ndarray, " z"] | None:
     """minimise cost y subject to A y <= b, rows of about unit length; None where none was found."""
-    y = _linear_bydual_active_set(cost, A, b)
+    y = _linear_by_dual_active_set(cost, A, b)
     if y is not None:
         return y
     for tolerance in _LINEAR_TOLERANCES:  # some faces are too slight for the finest
@@ -119,7 +119,7 @@ def _linear_program(
     return linprog(cost, A, b, bounds=(None, None), method="highs-ds", options=options)
 
 
-def _linear_bydual_active_set(cost: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+def _linear_by_dual_active_set(cost: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
     """The minimum of cost y, if the solver's multipliers l prove it: cost + A' l = 0, l >= 0.
 
     Then cost y >= -l b for every feasible y, which has to be met.

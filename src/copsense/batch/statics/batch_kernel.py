@@ -82,6 +82,7 @@ class BatchKernel:
         self._nq = int(stance.robot.model.nq)
         self._expected = arrays_of(self.empty(0))
         served = kernel_criteria(stance, self.criteria)
+        self._serves_all = len(served.column) == len(self.criteria)
         self.fallback_reason = why_not_covered(stance)
         if not self.fallback_reason and not len(served.column):
             self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
@@ -128,16 +129,15 @@ class BatchKernel:
             One row, overwritten by the next call.
 
         Raises:
-            InvalidInputError: a configuration that is not a contiguous array of nq floats, not
-                finite or not normalised.
+            InvalidInputError: a configuration that is not an array of nq floats, not finite or
+                not normalised.
         """
-        if self._single is None:
-            self._single = _Single(self)
-        row = q if _is_row(q, self._nq) else self.stance.robot.check_configuration(q)
-        if not self._single.evaluate(row):
-            return self._single.result
+        single = self._single = self._single or _Single(self)
+        row = q if _is_row(q, single.row) else self.stance.robot.check_configuration(q)
+        if not single.evaluate(row):
+            return single.result
         self.stance.robot.check_configuration(row)
-        return self._answered(self._single.q, self._single.result, self._single.doubtful)
+        return self._answered(single.q, single.result, single.doubtful)
 
     def _fill(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         """Have the kernel fill the results, block by block."""
@@ -209,6 +209,7 @@ class _Single:
 
     Attributes:
         q: the configuration (1, nq).
+        row: the same memory (nq,).
         result: one row, overwritten by every call.
         doubtful: above zero where the reference must answer, by criterion (1, nk).
     """
@@ -216,19 +217,20 @@ class _Single:
     def __init__(self, kernel: BatchKernel) -> None:
         """Allocate it, and take hold of the machine code."""
         self.q, self.result = np.zeros((1, kernel._nq)), kernel.empty(1)
+        self.row = self.q[0]
         self.doubtful = np.ones((1, len(kernel.names)), dtype=np.uint8)
-        self._fill: Callable[[np.ndarray, int, int], None] | None = None
+        self._partial = not kernel._serves_all  # in doubt whatever the kernel says
+        self._fill: Callable[[np.ndarray, int, int], bool] | None = None
         if not kernel.fallback_reason:
             self._fill = kernel._kernel.filling(self.q, self.result, self.doubtful)
             self._W = kernel._kernel.workspace()
 
     def evaluate(self, q: np.ndarray) -> bool:
         """Fill the result for a configuration (nq,); whether any criterion is in doubt."""
-        self.q[0] = q
+        self.row[:] = q
         if self._fill is None:
             return True
-        self._fill(self._W, 0, 1)
-        return bool(self.doubtful.any())
+        return bool(self._fill(self._W, 0, 1)) or self._partial
 
 
 def evaluate_batch(
@@ -262,13 +264,8 @@ def evaluate_batch(
     return batch.evaluate(configurations, out=out, threads=threads)
 
 
-def _is_row(value: object, nq: int) -> bool:
-    return (
-        isinstance(value, np.ndarray)
-        and value.dtype == np.float64
-        and value.shape == (nq,)
-        and value.flags.c_contiguous
-    )
+def _is_row(value: object, row: np.ndarray) -> bool:
+    return isinstance(value, np.ndarray) and value.shape == row.shape and value.dtype == row.dtype
 
 
 def _is_plain(value: object) -> TypeGuard[np.ndarray]:

@@ -21,8 +21,8 @@ class CompiledKernel:
     def __init__(self, layout: RobotLayout, criteria: KernelCriteria, nq: int) -> None:
         """Lay out the memory."""
         self._offset = workspace_offsets(layout, nq)
-        self._given = (*layout.parts, criteria, self._offset)
-        self._code: Callable[..., None] | None = None
+        self._given = (*layout.parts, criteria, np.array(self._offset))
+        self._code: Callable[..., bool] | None = None
 
     @property
     def compiled(self) -> bool:
@@ -38,8 +38,10 @@ class CompiledKernel:
 
     def filling(
         self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray
-    ) -> Callable[[np.ndarray, int, int], None]:
+    ) -> Callable[[np.ndarray, int, int], bool]:
         """A function of a workspace, a first row and an end, that fills these rows.
+
+        It returns whether any of them is doubtful for a criterion that the kernel serves.
 
         Args:
             q: configurations (N, nq), contiguous.

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from copsense.batch.compiler import entry
+from copsense.batch.compiler import entry, from_array
 from copsense.batch.kinematics import move, place_feet
 from copsense.batch.lanes import get, load, store
 from copsense.batch.layout import Feet, Tree
@@ -25,6 +25,8 @@ from copsense.batch.statics.tangents import level_gradients, span
 from copsense.batch.transfer import read_postures, write_postures
 from copsense.batch.vectors import along, load3, store3
 from copsense.batch.workspace import WIDTH, Offsets
+
+_offsets = from_array(Offsets)
 
 
 class Out(NamedTuple):
@@ -48,14 +50,19 @@ def evaluate_postures(
     tree: Tree,
     feet: Feet,
     criteria: KernelCriteria,
-    offset: Offsets,
+    offsets: Any,
     q: Any,
     out: Out,
     W: Any,
     start: int,
     stop: int,
-) -> None:
-    """Fill the results of postures start to stop, `WIDTH` abreast."""
+) -> bool:
+    """Fill the results of postures start to stop, `WIDTH` abreast; whether any is in doubt.
+
+    `offsets` are `Offsets` as an array.
+    """
+    offset = _offsets(offsets)
+    doubt = False
     nc, nv = len(feet.body), len(tree.parent) + 5
     moving = feet.held == 1
     gains = len(out.com_gain) > 0
@@ -107,9 +114,12 @@ def evaluate_postures(
                     if gains:
                         edge = int(get(W, offset.edge + k, lane))
                         out.tipping_edge[row, column, k] = edge
-                out.doubtful[row, column] = get(W, offset.doubt, lane) != 0.0
+                doubtful = get(W, offset.doubt, lane) != 0.0
+                out.doubtful[row, column] = doubtful
+                doubt = doubt or doubtful
         mass = tree.carried[0]
         for lane in range(count):
             for j in range(3):
                 h = get(W, offset.first_moment + j, lane)
                 out.com[first + lane, j] = get(W, offset.base + j, lane) + h / mass
+    return doubt
