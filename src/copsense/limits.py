@@ -204,6 +204,15 @@ class LimitRows(ShortRepr):
         """The kind of each row of `over_forces` (r + k,)."""
         return self.kinds + ("torque",) * len(self.joint)
 
+    def excess(self, problem: LoadProblem, forces: Float[np.ndarray, " m"]) -> float:
+        """By how much forces exceed the limit that they exceed most [N, Nm]; negative within all.
+
+        The largest of A f - b of `over_forces`, without its rows.
+        """
+        contacts = self.matrix.dot(forces[: self.matrix.shape[1]]) - self.bound
+        torques = np.abs(problem.torques(forces)) - self.torque
+        return max(float(contacts.max(initial=-np.inf)), float(torques.max(initial=-np.inf)))
+
     def over_forces(
         self, problem: LoadProblem
     ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:

@@ -88,7 +88,7 @@ class BalancingController:
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
         decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
         scale = 1.0 / np.diag(np.linalg.inv(decoupled)) if gains.scaled_by_inertia else 1.0
-        self._posture_gains = kp * scale, kd * scale
+        self._posture_gains = -kp * scale, -kd * scale
         # Where each stacked force stands among the wrenches.
         m = len(self._dynamics.J)
         self._slots = np.flatnonzero(stance.unstack(np.ones(m)).ravel())
@@ -116,8 +116,7 @@ class BalancingController:
             dyn.mass * (acceleration - self._gravity), -dyn.angular_map.dot(spin)
         )
         stiffness, damping = self._posture_gains
-        posture = -stiffness * away[6:] - damping * faster[6:]
-        torques, forces = self._compute(wrench, posture)
+        torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
         wrenches = np.zeros(self._wrenches)
         wrenches.put(self._slots, forces)
         return Command(torques, wrenches)
@@ -152,7 +151,7 @@ class BalancingController:
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve a symmetric system; the least solution where contacts are redundant."""
-    factor, info = lapack.dpotrf(matrix, lower=1)
+    factor, solved, info = lapack.dposv(matrix, right, lower=1)
     if info == 0 and well_determined(matrix, factor, _RANK):
-        return np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
+        return np.asarray(solved)
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])
