@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import NoneType
 from typing import Literal
@@ -164,6 +164,20 @@ class Contact(ShortRepr):
             return read_only(np.zeros((0, 6)))
         edges = zip(self.sole.normals, self.sole.offsets, strict=True)
         return read_only(np.array([edge_row(a, b) for a, b in edges]))
+
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """The outward normal of its plane, the contact frame's z, in the model's frame (3,)."""
+        return self.rotation[:, 2]
+
+    def at_height(self, height: float) -> Contact:
+        """The contact with its plane that high over the model's frame, along its normal [m].
+
+        What the offset has along the plane stays.
+        """
+        offset, up = np.array(self.offset), self.normal
+        x, y, z = (offset - (up @ offset) * up + height * up).tolist()
+        return replace(self, offset=(x, y, z))
 
     def on(self, robot: Robot) -> Attachment:
         """Where on a robot the contact is.
