@@ -216,6 +216,7 @@ def main():
     parser.add_argument("--packages", type=Path, help="folder of unpacked wheels")
     parser.add_argument("--only", default="", help="files whose path holds this text")
     parser.add_argument("--output", type=Path, default=Path(__file__).with_name("robots.md"))
+    parser.add_argument("--missing", default="", help="packages that could not be had, in words")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     args = parser.parse_args()
@@ -241,6 +242,7 @@ def main():
         f"try; {len(wrong)} differ from MuJoCo (MJCF) or Pinocchio's own reader (URDF) by more "
         "than 1e-9 in mass [kg], centre of mass [m] or a body's frame at random joint positions.",
         "",
+        *([f"Not had: {args.missing}.", ""] if args.missing else []),
         "| package | file | mass [kg] | largest difference | bodies | contacts | stands |",
         "|---|---|---|---|---|---|---|",
     ]

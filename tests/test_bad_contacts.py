@@ -152,3 +152,14 @@ def test_a_stance_width_is_a_positive_number(width):
 def test_a_stance_width_needs_two_contacts():
     with pytest.raises(InvalidInputError, match="Leave width out"):
         copsense.load_stance("icub", contacts=["l_sole"], width=0.1)
+
+
+def test_a_contact_put_at_a_height_keeps_what_it_has_along_its_plane():
+    # About x by a right angle: the contact's normal is the model's -y.
+    turned = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    contact = Contact("l_sole", rotation=turned, offset=(0.1, 0.5, 0.3), friction=0.4)
+    assert contact.normal.tolist() == [0.0, -1.0, 0.0]
+    raised = contact.at_height(-0.02)
+    assert raised.offset == pytest.approx((0.1, 0.02, 0.3))
+    assert raised.friction == 0.4
+    assert raised.normal @ raised.offset == pytest.approx(-0.02)

@@ -1,8 +1,10 @@
-"""Arrays that callers give: read-only copies, of the right shape and finite, or a clear error."""
+"""What callers give, or a clear error: arrays, as read-only copies, numbers, and other objects."""
 
 from __future__ import annotations
 
 import math
+import reprlib
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, TypeVar, cast, overload
 
@@ -52,6 +54,45 @@ def is_finite(array: np.ndarray) -> bool:
     NumPy takes three times as long for a few dozen numbers.
     """
     return all(map(math.isfinite, array.ravel().tolist()))
+
+
+def check_type(value: object, kind: type | tuple[type, ...], noun: str, remedy: str) -> None:
+    """Reject what is not of a type.
+
+    Args:
+        value: what the caller gave.
+        kind: the type it must have, or several.
+        noun: what the message calls that, such as ``"a stance"``.
+        remedy: a sentence that says what to give.
+
+    Raises:
+        InvalidInputError: it is not one; the message shows the beginning of it.
+    """
+    if not isinstance(value, kind):
+        raise InvalidInputError(f"{reprlib.repr(value)} is not {noun}. {remedy}")
+
+
+def check_name(value: object, what: str) -> None:
+    """Reject a name that is not text, or is empty.
+
+    Raises:
+        InvalidInputError: it is not one.
+    """
+    if not isinstance(value, str) or not value:
+        raise InvalidInputError(f"{what} is {reprlib.repr(value)}. Give a text.")
+
+
+def checked_positions(value: Mapping[str, float] | None, what: str) -> dict[str, float]:
+    """Joint -> position as a dictionary of its own, empty for None.
+
+    Raises:
+        InvalidInputError: it is not a mapping.
+    """
+    if value is None:
+        return {}
+    remedy = 'Give joint -> position, such as {"l_knee": -0.35} (rad, or m).'
+    check_type(value, Mapping, f"a mapping of {what}", remedy)
+    return dict(value)
 
 
 def finite_array(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import NoneType
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.arrays import finite_array, read_only
+from copsense.arrays import check_type, finite_array, finite_number, read_only
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
 from copsense.polygon import Polygon
@@ -101,8 +102,12 @@ class Contact(ShortRepr):
         label = self.name or self.frame
         _require(label, "a contact needs its frame. Give the name of a frame in the robot's model")
         object.__setattr__(self, "name", label)
+        check_type(label, str, "the name of a contact", "Give the name of its frame, a text.")
+        check_type(self.frame, str, "the name of a frame", "Give one of the robot's model.")
+        remedy = "Give Plane(point, normal), or None."
+        check_type(self.plane, (Plane, NoneType), "the plane of a contact", remedy)
         _require(
-            self.kind in COMPONENTS,
+            isinstance(self.kind, str) and self.kind in COMPONENTS,
             f"contact {label!r} is of kind {self.kind!r}. Valid kinds: {', '.join(COMPONENTS)}",
         )
         offset = finite_array(self.offset, f"the offset of contact {label!r}", (3,), "x, y, z [m]")
@@ -125,10 +130,11 @@ class Contact(ShortRepr):
             object.__setattr__(self, "polygon", outline.vertices)
         for what in ("friction", "torsional_friction"):
             value = getattr(self, what)
-            _require(
-                value is None or (np.isfinite(value) and value >= 0),
-                f"contact {label!r}: {what} is {value}. Give a non-negative number, or None",
-            )
+            if value is not None:
+                told = f"contact {label!r}: {what}"
+                number = finite_number(value, told)
+                _require(number >= 0, f"{told} is {value}. Give a non-negative number, or None")
+                object.__setattr__(self, what, number)
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -159,6 +165,20 @@ class Contact(ShortRepr):
         edges = zip(self.sole.normals, self.sole.offsets, strict=True)
         return read_only(np.array([edge_row(a, b) for a, b in edges]))
 
+    @property
+    def normal(self) -> Float[np.ndarray, " 3"]:
+        """The outward normal of its plane, the contact frame's z, in the model's frame (3,)."""
+        return self.rotation[:, 2]
+
+    def at_height(self, height: float) -> Contact:
+        """The contact with its plane that high over the model's frame, along its normal [m].
+
+        What the offset has along the plane stays.
+        """
+        offset, up = np.array(self.offset), self.normal
+        x, y, z = (offset - (up @ offset) * up + height * up).tolist()
+        return replace(self, offset=(x, y, z))
+
     def on(self, robot: Robot) -> Attachment:
         """Where on a robot the contact is.
 
@@ -184,7 +204,12 @@ def rectangle(
     x: tuple[float, float], y: tuple[float, float] = (0.0, 0.0)
 ) -> Float[np.ndarray, "4 2"]:
     """Vertices of a rectangular sole, counter-clockwise, in the contact frame [m]."""
-    return np.array([[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]])
+    what, need = "of the rectangle", "its two ends [m]"
+    (x0, x1), (y0, y1) = (
+        finite_array(x, f"x {what}", (2,), need),
+        finite_array(y, f"y {what}", (2,), need),
+    )
+    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 
 def _require(condition: object, message: str) -> None:

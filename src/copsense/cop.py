@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
@@ -11,6 +10,7 @@ from copsense.arrays import finite_array
 from copsense.contact import Plane
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.polygon import EdgeMargin, Polygon
+from copsense.rigid_body import link_momentum_rate, momentum_rate
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
@@ -148,15 +148,11 @@ def foot_rotation_indicator(
     if contact not in names:
         raise UnknownNameError("contact", contact, names)
     force, moment = _required(stance, velocity, acceleration)
-    model, data = stance.robot.model, stance.robot.model.createData()
-    pin.forwardKinematics(
-        model, data, stance.q, np.asarray(velocity, float), np.asarray(acceleration, float)
-    )
     k = names.index(contact)
     foot = stance.robot.frame(stance.contacts[k].frame).parentJoint
-    v, inertia = data.v[foot], model.inertias[foot]
-    rate = data.oMi[foot].act(inertia * data.a[foot] + inertia.vxiv(v))
-    force, moment = force - rate.linear, moment - rate.angular
+    v, a = np.asarray(velocity, float), np.asarray(acceleration, float)
+    rate = link_momentum_rate(stance.robot, stance.q, v, a, foot)
+    force, moment = force - rate[:3], moment - rate[3:]
     if other_wrenches is not None:
         shape, meaning = (len(names), 6), "in contact axes, force first"
         others = finite_array(other_wrenches, "other_wrenches", shape, meaning).copy()
@@ -180,6 +176,6 @@ def _required(
     model = stance.robot.model
     v = finite_array(velocity, "the velocity", (model.nv,), "the base in its frame, then joints")
     a = finite_array(acceleration, "the acceleration", (model.nv,), "as the velocity")
-    rate = pin.computeCentroidalMomentumTimeVariation(model, model.createData(), stance.q, v, a)
-    force = rate.linear - stance.robot.mass * model.gravity.linear
-    return force, rate.angular + np.cross(stance.com, force)
+    rate = momentum_rate(stance.robot, stance.q, v, a)
+    force = rate[:3] - stance.robot.mass * model.gravity.linear
+    return force, rate[3:] + np.cross(stance.com, force)

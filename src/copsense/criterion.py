@@ -9,6 +9,7 @@ The named ones are functions that return such a value; a new one is a new functi
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_name, check_type, finite_array, finite_number
 from copsense.contact import Contact
 from copsense.content import ByContent
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -45,6 +46,9 @@ __all__ = [
 ]
 
 
+_TERMS = (TorqueTerm, WrenchTerm)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Criterion(ByContent):
     """What a robot minimises when it shares its load among its contacts.
@@ -63,7 +67,14 @@ class Criterion(ByContent):
 
     def __post_init__(self) -> None:
         """Reject an empty sum and factors that would turn a minimum into a maximum."""
-        object.__setattr__(self, "terms", tuple(self.terms))
+        check_name(self.name, "the name of a criterion")
+        terms = self.terms
+        if not isinstance(terms, tuple | list) or not all(isinstance(t, _TERMS) for t in terms):
+            raise InvalidInputError(
+                f"the terms of criterion {self.name!r} are {reprlib.repr(terms)}. Give a tuple of "
+                "TorqueTerm and WrenchTerm values, or use minimum_torque() or minimum_wrench(1.0)."
+            )
+        object.__setattr__(self, "terms", tuple(terms))
         if not self.terms:
             raise InvalidInputError(f"criterion {self.name!r} has no term to minimise. Give one.")
         if not isinstance(self.tie_break, Criterion | None):
@@ -233,6 +244,12 @@ def mixed(
         tie_break: chooses where the sum leaves several minimisers.
         name: how it is called in results.
     """
+    for each in parts:
+        if not (isinstance(each, tuple) and len(each) == 2 and isinstance(each[0], Criterion)):
+            raise InvalidInputError(
+                f"{reprlib.repr(each)} is not a criterion with its factor. Give pairs, one by one: "
+                "mixed((minimum_torque(), 1.0), (minimum_wrench(1.0), 0.1))."
+            )
     terms = tuple(
         replace(
             term,
@@ -257,6 +274,18 @@ CRITERIA: dict[str, Callable[[float], Criterion]] = {
     ),
     "minimum-tangential": lambda length: minimum_tangential(minimum_wrench(length)),
 }
+
+
+def check_criterion(criterion: object) -> None:
+    """Reject what is not a criterion.
+
+    Raises:
+        InvalidInputError: it is something else, such as a policy or a list.
+    """
+    named = isinstance(criterion, str) and criterion in CRITERIA
+    given = repr(criterion) if named else "'minimum-torque'"
+    remedy = f"Give one, such as criterion_named({given})."
+    check_type(criterion, Criterion, "a criterion", remedy)
 
 
 def criterion_named(name: str, characteristic_length: float = 1.0) -> Criterion:

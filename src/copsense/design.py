@@ -20,9 +20,9 @@ from copsense.criterion import (
 )
 from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.json_data import json_data
-from copsense.limits import Limits
+from copsense.limits import Limits, check_limits
 from copsense.margins import margin_table
-from copsense.path import PosturePath
+from copsense.path import PosturePath, check_path
 from copsense.posture import supporting_joints
 from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
@@ -153,7 +153,7 @@ class Design(ShortRepr):
 def design_criterion(
     path: PosturePath,
     limits: Limits,
-    family: Family,
+    family: Family | str,
     *,
     objective: Objective = "travel",
     grid: int = 9,
@@ -166,7 +166,7 @@ def design_criterion(
     Args:
         path: postures to either side of its middle one, such as a lateral sweep.
         limits: what ends the travel.
-        family: the criteria to choose from, see `families`.
+        family: the criteria to choose from, one of `families` or its name.
         objective: ``"travel"`` maximises the smallest travel to a limit; ``"gain"`` minimises the
             largest norm of dCoP/dCoM over the postures that both of the paper's criteria can hold.
         grid: values per parameter.
@@ -174,8 +174,11 @@ def design_criterion(
 
     Raises:
         InvalidInputError: a path with failures or too few postures, or no criterion that works.
-        UnknownNameError: another objective.
+        UnknownNameError: another objective, or no family of that name.
     """
+    check_path(path)
+    check_limits(limits)
+    family = family_named(path.stances[0], family)
     if objective not in ("travel", "gain"):
         raise UnknownNameError("objective", objective, ("travel", "gain"))
     if len(path) < 5:
@@ -395,6 +398,20 @@ def families(stance: Stance) -> dict[str, Family]:
         )
         found.append(Family("joints", tuple(f"{g}_weight" for g in free), bounds, weighed))
     return {family.name: family for family in found}
+
+
+def family_named(stance: Stance, family: Family | str) -> Family:
+    """A family that can be designed at a stance, by its name; a `Family` is that one.
+
+    Raises:
+        UnknownNameError: no such family.
+    """
+    if isinstance(family, Family):
+        return family
+    known = families(stance)
+    if family not in known:
+        raise UnknownNameError("family", family, known)
+    return known[family]
 
 
 def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:

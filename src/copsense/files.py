@@ -7,11 +7,12 @@ import tempfile
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
 
-from copsense.arrays import finite_array
+from copsense.arrays import check_type, finite_array
 from copsense.errors import InvalidInputError, OutputError
 
 
@@ -27,7 +28,7 @@ def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool
         InvalidInputError: another suffix.
         OutputError: the file exists and may not be overwritten, or its folder cannot be written.
     """
-    path = Path(path)
+    path = checked_path(path, "an output")
     if "\0" in str(path):
         raise OutputError(f"{str(path)!r} is not a path. Leave the null character out.")
     if suffixes and path.suffix not in suffixes:
@@ -70,6 +71,16 @@ def write_beside(path: Path, write: Callable[[Path], object]) -> None:
         ) from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def checked_path(path: object, what: str) -> Path:
+    """A path as such.
+
+    Raises:
+        InvalidInputError: it is something else.
+    """
+    check_type(path, (str, os.PathLike), f"a path of {what}", "Give a text or a pathlib.Path.")
+    return Path(cast("str | os.PathLike[str]", path))
 
 
 def file_at(path: str | Path) -> bool:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
+from copsense.arrays import check_type
 from copsense.errors import InvalidInputError
 from copsense.extras import require
-from copsense.files import check_output, file_at, write_beside
+from copsense.files import check_output, checked_path, file_at, write_beside
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +48,10 @@ class LabelledResult:
 
     def __init__(self, dataset: xr.Dataset) -> None:
         """Copy the dataset."""
+        import xarray as xr
+
+        remedy = f"Give what {self._made_by} returns, or read a file with .load(path)."
+        check_type(dataset, xr.Dataset, f"the dataset of {self._what}", remedy)
         self._check(dataset, "this dataset", f"Give what {self._made_by} returns")
         own = dataset.copy(deep=True)
         for variable in own.variables.values():
@@ -168,7 +173,7 @@ class LabelledResult:
             InvalidInputError: there is no such file, or it holds something else.
         """
         remedy = f"Write one with: {cls._command}"
-        dataset = read_netcdf(Path(path), remedy)
+        dataset = read_netcdf(checked_path(path, cls._what), remedy)
         cls._check(dataset, str(path), remedy)
         return cls(dataset)
 

@@ -10,14 +10,14 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.arrays import array_property, finite_number, owned, read_only
+from copsense.arrays import array_property, check_type, finite_number, owned, read_only
 from copsense.contact import Contact, edge_row
 from copsense.content import ByContent, ShortRepr, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
 from copsense.robot import Robot
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 from copsense.wrench_cone import unit_cone
 
 _ROUNDING = 1e-9  # m
@@ -58,6 +58,10 @@ class Limits(ByContent):
 
     def __post_init__(self) -> None:
         """Own the torque limits; reject numbers that limit nothing or everything."""
+        given = self.torque
+        for flag in given.values() if isinstance(given, Mapping) else (given,):
+            if isinstance(flag, bool | np.bool_):
+                raise InvalidInputError(f"a torque limit is {flag}. Give a number [Nm], or None.")
         object.__setattr__(self, "torque", own(self.torque))
         for name in ("normal_force", "friction", "cop_margin", "torsion"):
             value = getattr(self, name)
@@ -200,6 +204,15 @@ class LimitRows(ShortRepr):
         """The kind of each row of `over_forces` (r + k,)."""
         return self.kinds + ("torque",) * len(self.joint)
 
+    def excess(self, problem: LoadProblem, forces: Float[np.ndarray, " m"]) -> float:
+        """By how much forces exceed the limit that they exceed most [N, Nm]; negative within all.
+
+        The largest of A f - b of `over_forces`, without its rows.
+        """
+        contacts = self.matrix.dot(forces[: self.matrix.shape[1]]) - self.bound
+        torques = np.abs(problem.torques(forces)) - self.torque
+        return max(float(contacts.max(initial=-np.inf)), float(torques.max(initial=-np.inf)))
+
     def over_forces(
         self, problem: LoadProblem
     ) -> tuple[Float[np.ndarray, "r m"], Float[np.ndarray, " r"]]:
@@ -216,6 +229,28 @@ class LimitRows(ShortRepr):
         return A, np.concatenate([self.bound, bound])
 
 
+def check_limits(limits: object) -> None:
+    """Reject what is not limits.
+
+    Raises:
+        InvalidInputError: it is something else, such as a table of them.
+    """
+    remedy = 'Give Limits(friction=0.33, torque="model"), say, or Limits.from_dict(...) of a table.'
+    check_type(limits, Limits, "a value of Limits", remedy)
+
+
+def optional_limits(limits: Limits | None) -> Limits | None:
+    """The limits, None where they limit nothing.
+
+    Raises:
+        InvalidInputError: they are neither limits nor None.
+    """
+    if limits is None:
+        return None
+    check_limits(limits)
+    return limits if limits.any else None
+
+
 def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
     """The rows of limits at a stance.
 
@@ -224,6 +259,8 @@ def limit_rows(stance: Stance, limits: Limits) -> LimitRows:
             sole is too narrow for its margin.
         UnknownNameError: a torque limit names no joint.
     """
+    check_stance(stance)
+    check_limits(limits)
     return _rows(stance.robot, tuple(stance.contacts), limits)
 
 

@@ -13,11 +13,11 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_number, read_only
+from copsense.arrays import check_type, finite_number, read_only
 from copsense.content import freeze
 from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
@@ -107,6 +107,21 @@ class PosturePath:
         return self.tangents[:, self.stances[0].robot.velocity_index(joint)]
 
 
+def check_path(path: object, *, search: bool = False) -> None:
+    """Reject what is not a path of postures.
+
+    Args:
+        path: what the caller gave.
+        search: whether a `LateralPath` serves too.
+
+    Raises:
+        InvalidInputError: it is something else, such as a stance.
+    """
+    kinds = (PosturePath, LateralPath) if search else (PosturePath,)
+    remedy = "Make one with copsense.lateral_sweep, joint_sweep or path_through."
+    check_type(path, kinds, "a path of postures", remedy)
+
+
 def lateral_sweep(
     stance: Stance,
     start: float,
@@ -133,6 +148,7 @@ def lateral_sweep(
         A path whose coordinate is ``com_y`` [m]. A posture out of reach is listed in
         `PosturePath.failures`.
     """
+    check_stance(stance)
     if com_x is None and stance.robot.base_nv == 6:
         com_x = float(np.mean([world.translation[0] for world in stance.placements]))
     if com_x is not None:
@@ -180,6 +196,7 @@ class LateralPath:
         Raises:
             InvalidInputError: no length, or no posture.
         """
+        check_stance(stance)
         reach = finite_number(reach, "the reach [m]", positive=True)
         if samples < 1:
             raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
@@ -244,6 +261,7 @@ def joint_sweep(
         cost: weights of the deviations from `stance`.
         progress: called with 1 after each posture.
     """
+    check_stance(stance)
     robot = stance.robot
     now = robot.joint_position(stance.q, joint)
 
@@ -275,8 +293,10 @@ def path_through(
     Raises:
         InvalidInputError: no configuration, a bad one, or one with a contact over 1e-9 away.
     """
+    check_stance(stance)
     stances: list[Stance] = []
     failures: dict[int, str] = {}
+    check_type(configurations, Iterable, "a list of configurations", "Give one (nq,) each.")
     for number, q in enumerate(configurations):
         try:
             stances.append(_placed(stance, q, number, project=project))
@@ -316,11 +336,16 @@ def _placed(stance: Stance, q: ArrayLike, number: int, *, project: bool) -> Stan
 
 def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
     start, stop = finite_number(start, "a sweep's start"), finite_number(stop, "a sweep's stop")
-    if int(count) != count or not 1 <= count <= _MOST_POSTURES:
+    try:
+        whole = int(count)
+        fits = whole == count and 1 <= whole <= _MOST_POSTURES
+    except (TypeError, ValueError, OverflowError):
+        fits = False
+    if not fits:
         raise InvalidInputError(
             f"a sweep of {count} postures cannot be made. Give a count from 1 to {_MOST_POSTURES}."
         )
-    return np.linspace(start, stop, int(count))
+    return np.linspace(start, stop, whole)
 
 
 def _held_x(stance: Stance) -> float | None:

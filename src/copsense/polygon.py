@@ -276,7 +276,8 @@ class Polygon:
         Args:
             x: only points of this x [m]; negative room where the polygon has none.
         """
-        from scipy.optimize import linprog  # slow to import, and seldom needed
+        # Slow to import, seldom needed, and not of `statics.qp`: polygons are below the statics.
+        from scipy.optimize import linprog
 
         found = linprog(
             [0.0, 0.0, -1.0],

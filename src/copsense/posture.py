@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,11 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number, owned
+from copsense.arrays import check_type, checked_positions, finite_array, finite_number, owned
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
-from copsense.stance import RANK_TOLERANCE, Stance
+from copsense.stance import RANK_TOLERANCE, Stance, check_stance
 
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 _STATIONARITY = 1e-11  # on the cost's gradient along the manifold
@@ -97,12 +97,14 @@ def solve_posture(
         UnreachablePostureError: no such posture was found; the message says what remains.
         UnknownNameError: a joint is not in the model.
     """
+    check_stance(stance)
     robot = stance.robot
     cost = cost or PostureCost()
-    joints = dict(joints or {})
-    if len(com) != 3:
+    joints = checked_positions(joints, "joint positions")
+    entries = len(com) if isinstance(com, Sized) else 1
+    if entries != 3:
         raise InvalidInputError(
-            f"com has {len(com)} entries. Give x, y and z [m], None where one is free."
+            f"com has {entries} entries. Give x, y and z [m], None where one is free."
         )
     wanted = [
         (i, finite_number(value, f"the CoM's {'xyz'[i]} [m]"))
@@ -117,6 +119,7 @@ def solve_posture(
             f"there are {len(places)} targets for {len(stance.contacts)} contacts. Give one each."
         )
     for contact, place in zip(stance.contacts, places, strict=True):
+        check_type(place, pin.SE3, f"a target of contact {contact.name!r}", "Give a pin.SE3.")
         finite_array(place.homogeneous, f"the target of contact {contact.name!r}", (4, 4))
     home = stance.q if reference is None else robot.check_configuration(reference)
     columns = [robot.velocity_index(joint) for joint in joints]

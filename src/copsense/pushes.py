@@ -31,8 +31,8 @@ from copsense.loads import Load, apply_loads
 from copsense.polygon import Polygon
 from copsense.regions.refinement import refine
 from copsense.regions.support_program import SupportProgram
-from copsense.stance import Stance
-from copsense.statics import share_load
+from copsense.stance import Stance, check_stance
+from copsense.statics import named_criteria, share_load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -205,13 +205,15 @@ def push_limits(
         UndeterminedWrenchError: a criterion leaves several wrenches equally good.
         InvalidInputError: the robot lives in a plane, or limits that do not fit the stance.
     """
+    check_stance(stance)
+    chosen = named_criteria(criteria, "a comparison of pushes", policies=False)
     robot = stance.robot
     if robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: it cannot be pushed out of it. Use a robot "
             "with a free-floating base."
         )
-    within = limits or Limits()
+    within = Limits() if limits is None else limits
     rows, problem = limit_rows(stance, within), LoadProblem.of(stance)
     # What a newton along world x and y takes off the balance.
     unit = [
@@ -222,7 +224,7 @@ def push_limits(
     slope, torque_slope = -taken[:nb], -taken[nb:]
     own = tuple(
         _criterion_pushes(stance, criterion, rows, problem, slope, torque_slope)
-        for criterion in criteria
+        for criterion in chosen.values()
     )
     best = _any_pushes(robot.weight, rows, problem, slope, torque_slope)
     return Pushes(stance, frame, read_only(unit[0].points[0].copy()), within, best, own)

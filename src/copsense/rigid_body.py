@@ -115,6 +115,41 @@ def mass_matrix(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, 
     return owned(pin.crba(memory.model, memory.data, q, pin.Convention.WORLD))
 
 
+def momentum_map(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, "6 nv"]:
+    """Momentum (linear, angular about the centre of mass) by velocities, world axes."""
+    memory = _scratch(robot)
+    return owned(pin.computeCentroidalMap(memory.model, memory.data, q))
+
+
+def momentum_rate(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    velocity: Float[np.ndarray, " nv"],
+    acceleration: Float[np.ndarray, " nv"],
+) -> Float[np.ndarray, " 6"]:
+    """Rate of the momentum (linear, angular about the centre of mass), world axes [N, Nm]."""
+    memory = _scratch(robot)
+    rate = pin.computeCentroidalMomentumTimeVariation(
+        memory.model, memory.data, q, velocity, acceleration
+    )
+    return owned(rate.vector)
+
+
+def link_momentum_rate(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    velocity: Float[np.ndarray, " nv"],
+    acceleration: Float[np.ndarray, " nv"],
+    joint: int,
+) -> Float[np.ndarray, " 6"]:
+    """Rate of one link's momentum (linear, angular about the world's origin) [N, Nm]."""
+    memory = _scratch(robot)
+    model, data = memory.model, memory.data
+    pin.forwardKinematics(model, data, q, velocity, acceleration)
+    inertia, v = model.inertias[joint], data.v[joint]
+    return owned(data.oMi[joint].act(inertia * data.a[joint] + inertia.vxiv(v)).vector)
+
+
 def torques_at_rest(
     robot: Robot, q: Float[np.ndarray, " nq"], forces: Mapping[int, pin.Force]
 ) -> Float[np.ndarray, " nv"]:

@@ -13,7 +13,7 @@ import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from copsense.arrays import array_property, finite_array, finite_number, read_only
+from copsense.arrays import array_property, check_type, finite_array, finite_number, read_only
 from copsense.description import Description, load_description
 from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
@@ -200,6 +200,8 @@ class Robot:
         cls, model: pin.Model, *, name: str | None = None, drives: Drives | None = None
     ) -> Robot:
         """Wrap a ready ``pin.Model`` (copied) whose first joint is a floating base."""
+        remedy = "Give what pin.buildModelFromUrdf(..., pin.JointModelFreeFlyer()) returns."
+        check_type(model, pin.Model, "a pin.Model", remedy)
         return cls(name or model.name or "robot", model.copy(), drives=drives or Drives())
 
     def with_drives(self, drives: Drives) -> Robot:

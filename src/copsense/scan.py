@@ -13,11 +13,11 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from jaxtyping import Float
 
-from copsense.criterion import Criterion
+from copsense.criterion import Criterion, check_criterion
 from copsense.errors import CopsenseError, InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, check_limits
 from copsense.margins import margin_table
-from copsense.path import LateralPath, PosturePath
+from copsense.path import LateralPath, PosturePath, check_path
 from copsense.roots import Track
 from copsense.scan_point import ScanPoint, rates_or_nan
 from copsense.sensitivity import cop_sensitivity
@@ -69,11 +69,15 @@ class PathScan:
         Raises:
             InvalidInputError: a policy, which has no derivatives.
         """
-        if not isinstance(criterion, Criterion):
+        check_path(path, search=True)
+        if limits is not None:
+            check_limits(limits)
+        if callable(criterion):
             raise InvalidInputError(
                 "a policy q -> wrenches has no exact derivatives to scan a path with. Give a "
                 "Criterion."
             )
+        check_criterion(criterion)
         self.path = path
         self.criterion = criterion
         self.limits = limits

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from copsense.arrays import array_property, finite_array, finite_number, read_only
 from copsense.content import freeze
 from copsense.cop import contact_cops
-from copsense.criterion import Criterion
+from copsense.criterion import Criterion, check_criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
 from copsense.limits import Limits
 from copsense.posture import retract
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 from copsense.statics import (
     PROJECT,
     ActiveSetChange,
@@ -315,6 +315,7 @@ def finite_difference_sensitivity(
     Each equilibrium is solved at a posture moved along a basis vector and pulled back onto the
     manifold.
     """
+    check_stance(stance)
     step = finite_number(step, "the step of the differences [rad, m]", positive=True)
     Z = stance.admissible_motions
     wrenches, torques = [], []
@@ -355,10 +356,11 @@ def check_sensitivity(
         SensitivityMismatchError: they differ by more; the message says where and by how much.
     """
     finite_number(tolerance, "the tolerance")
-    if not isinstance(criterion, Criterion):
+    if callable(criterion):
         raise InvalidInputError(
             "a policy is differentiated numerically: there is nothing to compare. Give a Criterion."
         )
+    check_criterion(criterion)
     exact = cop_sensitivity(stance, criterion, limits)
     numeric = finite_difference_sensitivity(stance, criterion, limits, step=step)
     pairs = {

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property, lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import block_diag, lapack
 
 from copsense import rigid_body
-from copsense.arrays import array_property, read_only
+from copsense.arrays import array_property, check_type, read_only
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.closures import Closures
 from copsense.contact import COMPONENT_NAMES, Contact, Plane
@@ -86,7 +87,9 @@ class Stance:
 
     def __post_init__(self, check: bool) -> None:
         """Validate the input and run the kinematics once."""
-        contacts = (self.contacts,) if isinstance(self.contacts, Contact) else tuple(self.contacts)
+        check_type(self.robot, Robot, "a robot", "Give one, such as copsense.load_robot(...).")
+        given: object = self.contacts
+        contacts: Any = tuple(given) if isinstance(given, Iterable) else (given,)
         layout = _layout(self.robot, contacts)
         q = self.robot.check_configuration(self.q)
         feet, local = rigid_body.place(self.robot, q, layout.attachments)
@@ -145,7 +148,7 @@ class Stance:
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
         """The same robot, configuration and loads on other contacts."""
-        return Stance(self.robot, self.q, tuple(contacts), loads=self.loads)
+        return Stance(self.robot, self.q, contacts, loads=self.loads)  # type: ignore[arg-type]
 
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
@@ -648,6 +651,17 @@ def _check_plane(contact: Contact, foot: pin.SE3) -> None:
             + ". Move the base or the joints (copsense.solve_posture places the feet), "
             "correct the contact's offset or rotation, or drop its plane."
         )
+
+
+def check_stance(stance: object) -> None:
+    """Reject what is not a stance.
+
+    Raises:
+        InvalidInputError: it is something else, such as a robot's name.
+    """
+    given = repr(stance) if isinstance(stance, str) else "..."
+    remedy = f"Make one with copsense.load_stance({given})."
+    check_type(stance, Stance, "a stance", remedy)
 
 
 def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:

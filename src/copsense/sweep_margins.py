@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from copsense.contact import Contact, Kind
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.limits import Limits, rows_of
+from copsense.limits import Limits, check_limits, rows_of
 from copsense.margins import UNITS, MarginTable
 from copsense.polygon import unpadded
 
@@ -34,6 +34,7 @@ def with_limit_margins(dataset: xr.Dataset, limits: Limits) -> xr.Dataset:
         InvalidInputError: a limit needs what the contacts do not have, or the sweep did not record.
         UnknownNameError: a torque limit names no joint.
     """
+    check_limits(limits)
     contacts = _contacts(dataset)
     rows = rows_of(contacts, limits, *_torque_limits(dataset, limits))
     table = MarginTable(contacts, rows)

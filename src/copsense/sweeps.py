@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+import reprlib
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from copsense.arrays import check_type
 from copsense.criterion import Criterion
-from copsense.errors import CopsenseError, InvalidInputError
+from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
 from copsense.extras import require
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
-from copsense.limits import Limits
-from copsense.path import PosturePath
+from copsense.limits import Limits, check_limits
+from copsense.path import PosturePath, check_path
 from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
-from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, policy_name
+from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, named_criteria
 from copsense.sweep_layout import SweepRows, sweep_dataset
 from copsense.sweep_margins import with_limit_margins
 
@@ -135,9 +137,19 @@ class Sweep(LabelledResult):
     def subset(
         self, criteria: Sequence[str] | None = None, postures: Sequence[int] | None = None
     ) -> Sweep:
-        """The sweep of some criteria, in the order given, and of some postures by position."""
+        """The sweep of some criteria, in the order given, and of some postures by position.
+
+        Raises:
+            UnknownNameError: a criterion that the sweep does not have.
+            InvalidInputError: a posture that it does not have, or not lists of them.
+        """
         found = self._dataset
         if criteria is not None:
+            remedy = f"Give a list of names among {', '.join(self.labels('criterion'))}."
+            check_type(criteria, (list, tuple), "a list of criteria's names", remedy)
+            for name in criteria:
+                if name not in self.labels("criterion"):
+                    raise UnknownNameError("criterion in the sweep", name, self.labels("criterion"))
             found = found.sel(criterion=list(criteria))
             recorded = json.loads(self.attrs.get("criteria", "[]"))
             if recorded:
@@ -145,7 +157,17 @@ class Sweep(LabelledResult):
                 kept = json.dumps([known[name] for name in criteria])
                 found = found.assign_attrs(criteria=kept)
         if postures is not None:
-            found = found.isel(posture=np.asarray(postures, dtype=int))
+            count = self.sizes["posture"]
+            numbers = np.asarray(postures)
+            whole = numbers.dtype.kind in "iu"
+            if not (
+                numbers.ndim == 1 and whole and np.all((-count <= numbers) & (numbers < count))
+            ):
+                raise InvalidInputError(
+                    f"postures is {reprlib.repr(postures)}. Give a list of positions from 0 to "
+                    f"{count - 1}."
+                )
+            found = found.isel(posture=numbers.astype(int))
         return Sweep(found)
 
     def with_limit_margins(self, limits: Limits) -> Sweep:
@@ -282,10 +304,14 @@ def sweep(
             limits, within which only a criterion can be solved.
     """
     require("xarray", "a sweep")
-    names = _names(criteria, limits)
-    rows = SweepRows(path.stances[0], len(path), names)
+    check_path(path)
+    if limits is not None:
+        check_limits(limits)
+    chosen = named_criteria(criteria, "a sweep")
+    _check_policies(chosen, limits)
+    rows = SweepRows(path.stances[0], len(path), list(chosen))
     for i, here in enumerate(path.stances):
-        for j, criterion in enumerate(criteria):
+        for j, criterion in enumerate(chosen.values()):
             if i in path.failures:
                 rows.reason[i, j] = path.failures[i]
                 continue
@@ -295,7 +321,7 @@ def sweep(
                 rows.reason[i, j] = str(error)
         if progress:
             progress(1)
-    dataset = sweep_dataset(path, rows, made_by(path.stances[0], criteria, limits))
+    dataset = sweep_dataset(path, rows, made_by(path.stances[0], list(chosen.values()), limits))
     if limits is not None:
         meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
         dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
@@ -304,24 +330,17 @@ def sweep(
     return Sweep(dataset)
 
 
-def _names(criteria: Sequence[Criterion | WrenchPolicy], limits: Limits | None) -> list[str]:
-    """The names of the criteria, checked."""
-    if isinstance(criteria, Criterion):
-        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
-    names = [str(c.name) if isinstance(c, Criterion) else policy_name(c) for c in criteria]
-    if not names or len(set(names)) != len(names):
-        raise InvalidInputError(
-            f"a sweep needs criteria of distinct names, got {', '.join(names) or 'none'}. "
-            "Give at least one; Criterion.named(...) renames one."
-        )
-    policies = [n for n, c in zip(names, criteria, strict=True) if not isinstance(c, Criterion)]
+def _check_policies(
+    criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None
+) -> None:
+    """Reject a policy within limits."""
+    policies = [name for name, c in criteria.items() if not isinstance(c, Criterion)]
     if limits is not None and policies:
         raise InvalidInputError(
             f"{policies[0]} is a policy: its wrenches are what it says, and limits cannot change "
             "them. Leave the limits out and ask for margins to them with "
             "sweep(...).with_limit_margins(limits), or give a Criterion."
         )
-    return names
 
 
 def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, tangent: np.ndarray) -> None:

@@ -11,7 +11,7 @@ import copsense
 from copsense.controllers import ShareByCriterion
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.statics import share_load
 
@@ -64,6 +64,19 @@ def test_the_same_holds_where_a_torque_is_at_its_limit(posture, criterion):
     assert [limit.name for limit in exact.active] == ["torque of l_hip_roll"]
     quick = ShareWithinLimits(posture, criterion, limits)(LoadProblem.of(posture))
     assert np.abs(quick - exact.forces).max() < 1e-6 * posture.robot.weight
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [Limits(), Limits(torque="model"), Limits(normal_force=None, cop_margin=None, torque=5.0)],
+    ids=["contacts", "both", "torques"],
+)
+def test_the_excess_is_that_of_the_row_exceeded_most(posture, limits):
+    rng, problem = np.random.default_rng(4), load(posture, moved=True)
+    rows = limit_rows(posture, limits)
+    A, b = rows.over_forces(problem)
+    for f in 100.0 * rng.standard_normal((30, A.shape[1])):
+        assert rows.excess(problem, f) == pytest.approx(np.max(A @ f - b), abs=1e-9)
 
 
 def test_the_cost_over_the_forces_is_the_criterions(posture):

@@ -16,19 +16,19 @@ from copsense.analysis.verdicts import verdict
 from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
-from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.errors import UndeterminedWrenchError
 from copsense.freedom import freedom_notes
 from copsense.json_data import json_data
-from copsense.limits import Limits, limit_rows, torque_placeholders
+from copsense.limits import Limits, limit_rows, optional_limits, torque_placeholders
 from copsense.path import LateralPath
 from copsense.posture import solve_posture
 from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 from copsense.statics import (
     StaticEquilibrium,
     WrenchPolicy,
-    policy_name,
+    named_criteria,
     solve_equilibrium,
     with_tie_break,
 )
@@ -226,13 +226,10 @@ def analyse(
         SensitivityMismatchError: the check failed.
         CopsenseError: a criterion has no solution here.
     """
-    if not isinstance(stance, Stance):
-        raise InvalidInputError(
-            f"{stance!r} is not a stance. Make one with copsense.load_stance(...)."
-        )
-    if isinstance(criteria, Criterion):
-        raise InvalidInputError("criteria is a single criterion. Give a list of them.")
-    chosen = _named(criteria)
+    check_stance(stance)
+    within = optional_limits(limits)
+    usual = (minimum_wrench(1.0), minimum_torque())
+    chosen = named_criteria(usual if criteria is None else criteria, "an analysis")
     if along is not None:
         stance.robot.velocity_index(along)
     planar = stance.robot.base_nv != 6
@@ -240,7 +237,6 @@ def analyse(
     y = float(stance.com[1]) if com_y is None else com_y
     posture = solve_posture(stance, com=(x, y, None), joints=joints)
     here, tangent = posture.stance, posture.tangents[:, 0 if x is None else 1]
-    within = limits if limits is not None and limits.any else None
     chosen, tied = _determined(here, chosen, within)
     found = {name: cop_sensitivity(here, c, within) for name, c in chosen.items()}
     if check:
@@ -263,21 +259,6 @@ def analyse(
         *joint_limit_notes(here),
     )
     return Analysis(here, tangent, found, within, limited, along, notes, check)
-
-
-def _named(
-    criteria: Sequence[Criterion | WrenchPolicy] | None,
-) -> dict[str, Criterion | WrenchPolicy]:
-    if criteria is None:
-        criteria = (minimum_wrench(1.0), minimum_torque())
-    named = {c.name if isinstance(c, Criterion) else policy_name(c): c for c in criteria}
-    if not named or len(named) != len(criteria):
-        names = ", ".join(named) or "none"
-        raise InvalidInputError(
-            f"an analysis needs criteria of distinct names, got {names}. Give at least one; "
-            "Criterion.named(...) renames one."
-        )
-    return named
 
 
 def _determined(

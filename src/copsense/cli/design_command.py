@@ -10,7 +10,6 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_range
-from copsense.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.design import Design, Score
@@ -76,7 +75,7 @@ def design(
     The CoM is swept sideways from the posture; each candidate is judged by how far it goes before
     its own wrenches, unclipped, meet a limit.
     """
-    from copsense.design import design_criterion, families
+    from copsense.design import design_criterion, family_named
     from copsense.files import check_output
     from copsense.limits import Limits
     from copsense.path import lateral_sweep
@@ -86,14 +85,12 @@ def design(
     within = read_limits(limits) or Limits()
     start, stop, count = read_range(com_y, "m")
     stance = read_stance(robot, **options)
-    known = families(stance)
-    if family not in known:
-        raise UnknownNameError("family", family, known)
+    chosen = family_named(stance, family)
     with progress_bar(count, "postures") as update:
         path = lateral_sweep(stance, start, stop, count, progress=update)
-    with progress_bar(grid ** len(known[family].parameters), "candidates") as update:
+    with progress_bar(grid ** len(chosen.parameters), "candidates") as update:
         found = design_criterion(
-            path, within, known[family], objective=objective, grid=grid, progress=update
+            path, within, chosen, objective=objective, grid=grid, progress=update
         )
     if picture is not None:
         from copsense.plots import plot_design, save_figure

@@ -7,7 +7,6 @@ from typing import Any
 
 import click
 
-from copsense.arrays import finite_number
 from copsense.cli.printing import echo_json
 from copsense.cli.units import ANGLE, LENGTH, Quantity
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -84,6 +83,8 @@ def four_bar(
             f"--xi is {math.degrees(xi):g} degrees. Give an angle over 0 and under 180 degrees, at "
             "which the linkage is collapsed, such as 85, 85deg or 1.5rad; 90 stands upright."
         )
+    from copsense.arrays import finite_number
+
     for name, value in parameters.items():  # also of those that this criterion does not use
         finite_number(value, f"--{name.replace('_', '-')}", positive=True)
     own = {k: v for k, v in parameters.items() if k in FOUR_BAR_CRITERIA[criterion].defaults}

@@ -224,7 +224,7 @@ def _read_contacts(
     if sole_height is not None:
         if not math.isfinite(sole_height):
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
-        contacts = [_raised(c, sole_height) if c.kind != "point" else c for c in contacts]
+        contacts = [c.at_height(sole_height) if c.kind != "point" else c for c in contacts]
     return list(contacts) or None
 
 
@@ -250,14 +250,6 @@ def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None
     if frame in frames:
         raise UnknownNameError("kind of contact", kind, COMPONENTS)
     return text, None  # the look-up of the frame reports what there is
-
-
-def _raised(contact: Contact, height: float) -> Contact:
-    """The contact with its plane that high over the model's frame, along its own z."""
-    from dataclasses import replace
-
-    x, y, z = (float(c) * height for c in contact.rotation[:, 2])
-    return replace(contact, offset=(x, y, z))
 
 
 def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:

@@ -93,9 +93,8 @@ class RobotChoice:
             contacts = []
             for frame, (x0, x1, y0, y1) in self.soles.items():
                 own = next((c for c in known if c.frame == frame), Contact(frame))
-                x, y, z = (float(c) * self.sole_height for c in own.rotation[:, 2])
                 sole = rectangle((float(x0), float(x1)), (float(y0), float(y1)))
-                contacts.append(replace(own, polygon=sole, offset=(x, y, z)))
+                contacts.append(replace(own, polygon=sole).at_height(self.sole_height))
         return load_stance(
             robot, contacts=contacts, posture=posture.angles(self.source), width=posture.width
         )

@@ -18,11 +18,11 @@ from copsense.comparison.trials import Breaking, Falls, Lean, PushToTip, Rest, S
 from copsense.controllers import Hold, Sine
 from copsense.simulation import Motors, Noise, Push, Recording
 from copsense.simulation.prediction import predict_impulse
+from copsense.simulation.recording import SETTLING
 from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push
 _AFTER = 1.0  # s to watch after a push
-_SETTLED = 0.1, 0.2  # s, or share of a run: the contacts settle
 _FASTEST = 0.5  # m/s of the CoM: any larger push tips a contact
 
 
@@ -78,7 +78,7 @@ def _sway(trial: Sway, runner: CaseRunner) -> list[Score]:
     rows = {name: Score(name, "failed", reason=reason) for name in trial.scores}
     margin = rows["smallest_margin"]
     if run.completed:
-        late = run.sel(time=slice(min(_SETTLED[0], _SETTLED[1] * trial.seconds), None))
+        late = run.settled
         smallest = late["margin"].min().item()
         if math.isfinite(smallest):
             margin = _measured(margin, smallest)
@@ -239,7 +239,7 @@ def _with_contact(row: Score, run: Recording) -> Score:
 
 def _extent(trial: Sway) -> tuple[float, float]:
     """Least and largest CoM y of the scored part of a sway, from its start [m]."""
-    begin = min(_SETTLED[0], _SETTLED[1] * trial.seconds) * trial.frequency
+    begin = SETTLING * trial.frequency if trial.seconds > SETTLING else 0.0
     turns = np.arange(math.ceil(2 * begin - 0.5), math.floor(2 * trial.periods - 0.5) + 1)
     at = np.concatenate([[begin, trial.periods], 0.25 + 0.5 * turns])  # periods
     y = trial.amplitude * np.sin(2 * np.pi * at)

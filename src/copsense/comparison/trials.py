@@ -84,7 +84,7 @@ class PushToTip:
 class Sway:
     """A sinusoidal lateral sway, the same motion for every controller.
 
-    The first 0.1 s (or a fifth of the time, if shorter) is not scored: the contacts settle.
+    The first 0.1 s is not scored, while the contacts settle; see `Recording.settled`.
 
     Attributes:
         amplitude: of CoM y [m]; a negative one starts to the right.

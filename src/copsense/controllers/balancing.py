@@ -28,15 +28,16 @@ import pinocchio as pin
 from jaxtyping import Float
 from scipy.linalg import lapack
 
+from copsense.arrays import check_type
 from copsense.controllers.controller import Command, Observation
 from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
-from copsense.criterion import Criterion
-from copsense.limits import Limits
+from copsense.criterion import Criterion, check_criterion
+from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _RANK = 1e-10  # relative pivot under which the contacts are taken as redundant
 
@@ -69,6 +70,10 @@ class BalancingController:
         name: str | None = None,
     ) -> None:
         """Prepare the gains and check that the criterion determines the forces."""
+        check_stance(stance)
+        check_criterion(criterion)
+        limits = optional_limits(limits)
+        check_type(gains, Gains, "a set of gains", "Give STIFF, public_gains(robot) or Gains(...).")
         self.stance = stance
         self.criterion = criterion
         self.gains = gains
@@ -83,7 +88,7 @@ class BalancingController:
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
         decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
         scale = 1.0 / np.diag(np.linalg.inv(decoupled)) if gains.scaled_by_inertia else 1.0
-        self._posture_gains = kp * scale, kd * scale
+        self._posture_gains = -kp * scale, -kd * scale
         # Where each stacked force stands among the wrenches.
         m = len(self._dynamics.J)
         self._slots = np.flatnonzero(stance.unstack(np.ones(m)).ravel())
@@ -111,8 +116,7 @@ class BalancingController:
             dyn.mass * (acceleration - self._gravity), -dyn.angular_map.dot(spin)
         )
         stiffness, damping = self._posture_gains
-        posture = -stiffness * away[6:] - damping * faster[6:]
-        torques, forces = self._compute(wrench, posture)
+        torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
         wrenches = np.zeros(self._wrenches)
         wrenches.put(self._slots, forces)
         return Command(torques, wrenches)
@@ -147,7 +151,7 @@ class BalancingController:
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve a symmetric system; the least solution where contacts are redundant."""
-    factor, info = lapack.dpotrf(matrix, lower=1)
+    factor, solved, info = lapack.dposv(matrix, right, lower=1)
     if info == 0 and well_determined(matrix, factor, _RANK):
-        return np.asarray(lapack.dpotrs(factor, right, lower=1)[0])
+        return np.asarray(solved)
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])

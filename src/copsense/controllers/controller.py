@@ -86,12 +86,12 @@ def ask(
     Raises:
         ControllerError: it raised, or did not return n finite torques; the message says when.
     """
-    when = f"controller {controller_name(controller)!r} at {observation.time:.3f} s"
     try:
         answer = controller(observation)
     except (Exception, SystemExit) as error:
         raise ControllerError(
-            f"{when} raised {type(error).__name__}: {error}. Fix the controller for this state."
+            f"{_when(controller, observation)} raised {type(error).__name__}: {error}. "
+            "Fix the controller for this state."
         ) from error
     torques: Any = answer.torques if isinstance(answer, Command) else answer
     wrenches = answer.wrenches if isinstance(answer, Command) else None
@@ -109,7 +109,11 @@ def ask(
             ),
         )
     except InvalidInputError as error:
-        raise ControllerError(f"{when}: {error}") from None
+        raise ControllerError(f"{_when(controller, observation)}: {error}") from None
+
+
+def _when(controller: object, observation: Observation) -> str:
+    return f"controller {controller_name(controller)!r} at {observation.time:.3f} s"
 
 
 def _copied(values: Any, what: str, shape: tuple[int, ...], meaning: str) -> np.ndarray:

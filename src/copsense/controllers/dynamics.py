@@ -52,6 +52,7 @@ class StandingDynamics:
         self.angular_map: Float[np.ndarray, "3 nv"] = self.data.Ag[3:]
         self.com: Float[np.ndarray, " 3"] = self.data.com[0]
         self.com_velocity: Float[np.ndarray, " 3"] = self.data.vcom[0]
+        self._at_com = pin.SE3.Identity()
         self._base: pin.SE3 = self.data.oMi[1]
         # Row-major, so that J' is as LAPACK wants it.
         self.J: Float[np.ndarray, "m nv"] = np.zeros((stance.rows[-1].stop, robot.model.nv))
@@ -86,9 +87,5 @@ class StandingDynamics:
         self, force: Float[np.ndarray, " 3"], moment: Float[np.ndarray, " 3"]
     ) -> Float[np.ndarray, " 6"]:
         """A wrench about the centre of mass, world axes, as one on the base in its own axes."""
-        base = self._base
-        # Written out: np.cross alone would take a tenth of the controller's step.
-        (x, y, z), (fx, fy, fz) = (self.com - base.translation).tolist(), force.tolist()
-        mx, my, mz = moment.tolist()
-        about_base = (mx + y * fz - z * fy, my + z * fx - x * fz, mz + x * fy - y * fx)
-        return np.array(((fx, fy, fz), about_base)).dot(base.rotation).ravel()
+        self._at_com.translation = self.com
+        return self._base.actInv(self._at_com.act(pin.Force(force, moment))).vector

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg
 from jaxtyping import Float
 
-from copsense.controllers.sharing import ShareByCriterion
+from copsense.controllers.sharing import ShareByCriterion, allowed
 from copsense.criterion import Criterion
 from copsense.errors import UnsolvedError
 from copsense.limits import Limits, limit_rows
@@ -47,13 +46,13 @@ class ShareWithinLimits:
         Raises:
             UnsolvedError: the solver failed.
         """
-        A, b = self._rows.over_forces(problem)
-        forces = self._free(problem)
-        if np.all(A.dot(forces) <= b + _FEASIBLE * self._weight):
+        forces, Z = allowed(problem.base_map, problem.base_wrench)
+        forces = self._free.among(problem, forces, Z)
+        if self._rows.excess(problem, forces) <= _FEASIBLE * self._weight:
             return forces
+        A, b = self._rows.over_forces(problem)
         H, g = self._quadratic.over_forces(problem)
         B, left, slope = problem.base_map, b - A.dot(forces), H.dot(forces) - g
-        Z = scipy.linalg.qr(B.T)[0][:, len(B) :]
         # f = forces + Z y has the wanted momentum rate.
         if Z.shape[1]:  # one foot has no choice
             y = quick_optimum(Z.T.dot(H).dot(Z), Z.T.dot(slope), A.dot(Z), left, self._weight)

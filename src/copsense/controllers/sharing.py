@@ -49,16 +49,25 @@ class ShareByCriterion:
         Raises:
             UndeterminedWrenchError: the criterion and its tie-breaks leave several.
         """
-        forces, Z = _allowed(problem.base_map, problem.base_wrench)
+        return self.among(problem, *allowed(problem.base_map, problem.base_wrench))
+
+    def among(
+        self, problem: LoadProblem, forces: Float[np.ndarray, " m"], Z: Float[np.ndarray, "m z"]
+    ) -> Float[np.ndarray, " m"]:
+        """Those of least cost (m,) among forces + Z y, see `allowed`.
+
+        Raises:
+            UndeterminedWrenchError: the criterion and its tie-breaks leave several.
+        """
         if not Z.shape[1]:  # one foot has no choice
             return np.asarray(forces)
         for level in self._levels:
             # The cost along Z from these forces: curvature, and minus the slope.
             cost, pull = level.over_forces(problem)
             H, g = Z.T.dot(cost.dot(Z)), Z.T.dot(pull - cost.dot(forces))
-            cholesky, info = lapack.dpotrf(H)
+            cholesky, y, info = lapack.dposv(H, g)
             if info == 0 and well_determined(H, cholesky, _NULL):
-                return np.asarray(forces + Z.dot(lapack.dpotrs(cholesky, g)[0]))
+                return np.asarray(forces + Z.dot(y))
             values, vectors = np.linalg.eigh(H)
             seen = values > _NULL * max(float(values[-1]), 1e-300)
             on = vectors[:, seen]
@@ -84,7 +93,7 @@ def well_determined(matrix: np.ndarray, factor: np.ndarray, least: float) -> boo
     return bool(min(pivots) ** 2 > least * max(entries))
 
 
-def _allowed(
+def allowed(
     B: Float[np.ndarray, "6 m"], wrench: Float[np.ndarray, " 6"]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The smallest forces with B f = wrench, and an orthonormal basis of those with B f = 0.

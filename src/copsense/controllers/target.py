@@ -219,9 +219,9 @@ class PathReference:
         self._values: list[float] = values.tolist()
         stances = path.stances
         self._model = stances[0].robot.model
-        self._com = np.array([s.com for s in stances])
         self._q = [s.q for s in stances]
         # Of each interval: what the basis below weighs, for the CoM and then the configuration.
+        com = np.array([s.com for s in stances])
         ends = np.array(
             [
                 np.concatenate([s.com_jacobian @ t, t])
@@ -230,9 +230,9 @@ class PathReference:
         )
         h = np.diff(values)[:, None]
         steps = [pin.difference(self._model, a, b) for a, b in pairwise(self._q)]
-        self._shapes = np.stack(
-            [h * ends[:-1], np.hstack([np.diff(self._com, axis=0), steps]), h * ends[1:]], axis=1
-        )
+        start = np.hstack([com[:-1], np.zeros_like(steps)])
+        across = np.hstack([np.diff(com, axis=0), steps])
+        self._shapes = np.stack([start, h * ends[:-1], across, h * ends[1:]], axis=1)
 
     def at(self, time: float) -> Target:
         """The target at a time [s], its arrays read-only."""
@@ -241,25 +241,22 @@ class PathReference:
         i = min(max(bisect_right(values, value) - 1, 0), len(values) - 2)
         h = values[i + 1] - values[i]
         u = (value - values[i]) / h
-        # Cubic Hermite basis and its derivatives.
+        # Cubic Hermite basis; its derivatives by the coordinate, and so by time.
+        a, b, c = ((1 - u) * (1 - 3 * u) / h, 6 * u * (1 - u) / h, u * (3 * u - 2) / h)
+        squared = rate**2 / h**2
         basis = np.array(
             (
-                (u * (1 - u) ** 2, u * u * (3 - 2 * u), u * u * (u - 1)),
-                ((1 - u) * (1 - 3 * u) / h, 6 * u * (1 - u) / h, u * (3 * u - 2) / h),
-                ((6 * u - 4) / h**2, (6 - 12 * u) / h**2, (6 * u - 2) / h**2),
+                1.0, u * (1 - u) ** 2, u * u * (3 - 2 * u), u * u * (u - 1),
+                0.0, a * rate, b * rate, c * rate,
+                0.0, a * second + (6 * u - 4) * squared, b * second + (6 - 12 * u) * squared,
+                c * second + (6 * u - 2) * squared,
             )
-        )
-        moved, slope, bend = basis.dot(self._shapes[i])
-        found = (
-            self._com[i] + moved[:3],
-            slope[:3] * rate,
-            slope[:3] * second + bend[:3] * rate**2,
-            pin.integrate(self._model, self._q[i], moved[3:]),
-            slope[3:] * rate,
-        )
-        for array in found:
-            array.setflags(write=False)
-        return Target(*found)
+        ).reshape(3, 4)  # fmt: skip
+        found = basis.dot(self._shapes[i])
+        found.setflags(write=False)
+        posture = pin.integrate(self._model, self._q[i], found[0, 3:])
+        posture.setflags(write=False)
+        return Target(found[0, :3], found[1, :3], found[2, :3], posture, found[1, 3:])
 
 
 def lateral_reference(stance: Stance, signal: Signal) -> PathReference:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +12,11 @@ from copsense.arrays import whole_number
 from copsense.content import ShortRepr
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, optional_limits
 from copsense.maps.sampling import Sample, Sampling
 from copsense.provenance import model_digest, plain
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
+from copsense.statics import named_criteria
 
 FORMAT = 2  # of the store; counted up when what is written changes
 
@@ -33,7 +35,7 @@ class MapPlan(ShortRepr):
     """
 
     stance: Stance
-    criteria: tuple[Criterion, ...]
+    criteria: Sequence[Criterion]
     sampling: Sampling
     limits: Limits | None = None
     chunk: int = 4096
@@ -41,8 +43,10 @@ class MapPlan(ShortRepr):
 
     def __post_init__(self) -> None:
         """Validate the criteria and the size of a chunk."""
-        given = (self.criteria,) if isinstance(self.criteria, Criterion) else self.criteria
-        object.__setattr__(self, "criteria", tuple(given))
+        check_stance(self.stance)
+        object.__setattr__(self, "limits", optional_limits(self.limits))
+        given = tuple(named_criteria(self.criteria, "a map").values())
+        object.__setattr__(self, "criteria", given)
         for criterion in self.criteria:
             if not isinstance(criterion, Criterion):
                 raise InvalidInputError(
@@ -50,8 +54,6 @@ class MapPlan(ShortRepr):
                     "written into the store. Give Criterion values."
                 )
         object.__setattr__(self, "chunk", whole_number(self.chunk, "the size of a chunk"))
-        if self.limits is not None and not self.limits.any:
-            object.__setattr__(self, "limits", None)
 
     @property
     def chunks(self) -> int:

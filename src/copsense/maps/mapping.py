@@ -77,7 +77,7 @@ def map_postures(
         MissingExtraError: Zarr or Dask is not installed.
     """
     store = fill_map(
-        MapPlan(stance, tuple(criteria), sampling, limits, chunk, configurations),
+        MapPlan(stance, criteria, sampling, limits, chunk, configurations),
         path,
         threads=threads,
         scheduler=scheduler,

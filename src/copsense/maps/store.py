@@ -26,7 +26,7 @@ from jaxtyping import Float
 from copsense._version import __version__
 from copsense.errors import CopsenseError, OutputError
 from copsense.extras import require
-from copsense.files import check_output
+from copsense.files import check_output, checked_path
 from copsense.maps.columns import (
     EVALUATED,
     PENDING,
@@ -178,7 +178,7 @@ def check_store(path: str | Path) -> Path:
         MissingExtraError: Zarr is not installed.
     """
     _zarr()
-    path = Path(path)
+    path = checked_path(path, "a map")
     try:
         there = path.exists() or path.is_symlink()
     except (OSError, ValueError):
@@ -195,7 +195,7 @@ def open_map(path: str | Path) -> MapStore:
     Raises:
         OutputError: nothing is there, or it is not a map of this version of copsense.
     """
-    zarr, path = _zarr(), Path(path)
+    zarr, path = _zarr(), checked_path(path, "a map")
     not_a_map = f"{str(path)[:300]} is not a map of copsense"
     remedy = "It was not touched. Give another path, such as map.zarr."
     try:

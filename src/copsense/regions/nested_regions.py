@@ -12,11 +12,12 @@ from jaxtyping import Float
 from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.json_data import json_data
-from copsense.limits import Limits
+from copsense.limits import Limits, check_limits
 from copsense.regions.feasible_region import com_region
 from copsense.regions.region import ComRegion
 from copsense.regions.unclipped_region import criterion_region
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
+from copsense.statics import named_criteria
 
 SUPPORTED, ACTUATED = "friction and soles", "and torque limits"
 
@@ -116,6 +117,9 @@ def com_regions(
         InvalidInputError: limits or weights that do not fit the stance.
         UnknownNameError: a torque limit names no joint.
     """
+    check_stance(stance)
+    check_limits(limits)
+    chosen = named_criteria(criteria, "a comparison of regions", policies=False)
     actuated = None
     if limits.torque is not None:
         actuated = com_region(stance, limits, tolerance=tolerance)
@@ -123,5 +127,5 @@ def com_regions(
         stance.com[:2],
         com_region(stance, replace(limits, torque=None), tolerance=tolerance),
         actuated,
-        {c.name: criterion_region(stance, c, limits) for c in criteria},
+        {name: criterion_region(stance, c, limits) for name, c in chosen.items()},
     )

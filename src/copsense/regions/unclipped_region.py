@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits, limit_rows
+from copsense.limits import Limits, check_limits, limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.polygon import Polygon
 from copsense.regions.refinement import Point
@@ -54,6 +54,7 @@ def criterion_region(
             fit the stance.
         UnknownNameError: a torque limit names no joint.
     """
+    check_limits(limits)
     axes = com_axes(stance)
     affine = _moving_equilibrium if moving else _held_equilibrium
     f0, F, tau0, T = affine(stance, criterion, axes)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
-from copsense.stance import Stance
+from copsense.rigid_body import base_axes
+from copsense.stance import Stance, check_stance
 
 _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 
@@ -33,18 +33,16 @@ def balance_at(stance: Stance, com: ArrayLike) -> Float[np.ndarray, " nv"]:
 
 def gravity_slope(stance: Stance) -> Float[np.ndarray, "nb 2"]:
     """S = dG_b/dc, the base's rows by world x, y of the centre of mass [N]."""
-    model, nb = stance.robot.model, stance.robot.base_nv
-    data = model.createData()
-    pin.computeJointJacobians(model, data, stance.q)
-    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    turning = pin.getJointJacobian(model, data, 1, world)[3:, :nb]
+    robot = stance.robot
+    turning = base_axes(robot, stance.q)
     # By virtual work the base carries the weight's moment, c x (-m g), along what it can turn.
-    lift = -stance.robot.mass * np.asarray(model.gravity.linear)
+    lift = -robot.mass * np.asarray(robot.model.gravity.linear)
     return np.asarray(turning.T @ np.cross(np.eye(3)[:2], lift).T)
 
 
 def com_axes(stance: Stance) -> Float[np.ndarray, "2 r"]:
     """Orthonormal horizontal directions in which the CoM may move: x and y, or a plane's own."""
+    check_stance(stance)
     if stance.robot.base_nv == 6:
         return np.eye(2)
     u, size, _ = np.linalg.svd(gravity_slope(stance).T)

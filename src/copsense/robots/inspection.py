@@ -113,7 +113,7 @@ class Inspection:
                         "tilt": None if foot.sole is None else foot.sole.tilt,
                         "polygon": None if foot.sole is None else foot.sole.polygon.tolist(),
                         "x_axis": foot.contact.rotation[:, 0].tolist(),
-                        "z_axis": foot.contact.rotation[:, 2].tolist(),
+                        "z_axis": foot.contact.normal.tolist(),
                     }
                     for foot in self.feet
                 ],

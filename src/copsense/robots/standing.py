@@ -12,7 +12,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import checked_positions, finite_array, finite_number
 from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
@@ -171,8 +171,9 @@ def load_stance(
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}
-    q = robot.configuration({**rest_positions(robot), **own, **(posture or {})})
-    q = close(robot, q, held=posture if posture else own)
+    wanted = checked_positions(posture, "the posture's joints")
+    q = robot.configuration({**rest_positions(robot), **own, **wanted})
+    q = close(robot, q, held=wanted or own)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "

@@ -18,15 +18,15 @@ from copsense.controllers import (
     Sine,
     lateral_reference,
 )
-from copsense.criterion import Criterion, minimum_torque
+from copsense.criterion import Criterion, check_criterion, minimum_torque
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, check_limits
 from copsense.simulation.control_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 
 def balance(
@@ -70,6 +70,11 @@ def balance(
         InvalidInputError: limits for a controller of your own, without a criterion.
         CopsenseError: the scenario does not fit the robot, or the controller failed at the start.
     """
+    check_stance(stance)
+    if criterion is not None:
+        check_criterion(criterion)
+    if limits is not None:
+        check_limits(limits)
     if controller is not None and criterion is None and limits is not None:
         raise InvalidInputError(
             "limits (--limits) are those of the built-in controller and of the static prediction. "

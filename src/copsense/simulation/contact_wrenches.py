@@ -11,8 +11,6 @@ from jaxtyping import Float
 from copsense.errors import InvalidInputError
 from copsense.stance import Stance
 
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # the other two axes, in a cross product
-
 Measure = Callable[
     [Float[np.ndarray, "nc 3"], Float[np.ndarray, "nc 3 3"]], Float[np.ndarray, "nc 2 3"]
 ]
@@ -40,7 +38,7 @@ class ContactWrenches:
         self._mujoco, self._model, self._data = mujoco, model, data
         names = stance.contact_names
         sites = [model.site(f"contact {name}").id for name in names]
-        self._links = [int(model.site_bodyid[site]) for site in sites]
+        self._links = np.array([int(model.site_bodyid[site]) for site in sites])
         self._com, self._outer = data.subtree_com[1], data.cfrc_ext
         points = [model.geom(g).name.partition(" | ") for g in range(model.ngeom)]
         self._contact_of = np.array([names.index(name) if mark else -1 for name, mark, _ in points])
@@ -49,7 +47,7 @@ class ContactWrenches:
         self._gravity = stance.robot.model.gravity.linear
         self._feet: tuple[tuple[float, np.ndarray], ...] = _feet(stance) if sensors else ()
         # The engine sums by link, which is quicker than to sum here.
-        alone = len(set(self._links)) == len(names)
+        alone = len(np.unique(self._links)) == len(names)
         self._measure: Measure = (
             self._by_sensor if sensors else self._by_link if alone else self._by_point
         )
@@ -77,13 +75,16 @@ class ContactWrenches:
     def _by_link(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         # The engine's own sums: moment, then force, on each link about the robot's CoM.
         self._mujoco.mj_rnePostConstraint(self._model, self._data)
-        outer, arm = self._outer[self._links], self._com - positions
-        found, force = np.empty((len(positions), 2, 3)), outer[:, 3:]
-        found[:, 0] = force
-        found[:, 1] = (
-            outer[:, :3] + arm[:, _NEXT] * force[:, _LAST] - arm[:, _LAST] * force[:, _NEXT]
-        )
-        return found
+        found: list[float] = []
+        cx, cy, cz = self._com.tolist()
+        # Written out: for so few numbers NumPy's own product takes four times as long.
+        for outer, (px, py, pz) in zip(
+            self._outer.take(self._links, axis=0).tolist(), positions.tolist(), strict=True
+        ):
+            mx, my, mz, fx, fy, fz = outer
+            x, y, z = cx - px, cy - py, cz - pz
+            found += (fx, fy, fz, mx + y * fz - z * fy, my + z * fx - x * fz, mz + x * fy - y * fx)
+        return np.array(found).reshape(-1, 2, 3)
 
     def _by_point(self, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
         points = self._data.contact

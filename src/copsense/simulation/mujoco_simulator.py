@@ -65,7 +65,7 @@ class MujocoSimulator:
         """Build the model and compare the engines."""
         if wrenches not in ("contacts", "sensors"):
             raise UnknownNameError("source of wrenches", wrenches, ("contacts", "sensors"))
-        self._stance = stance
+        self._stance, self._nq = stance, stance.robot.model.nq
         self.settings: PhysicsSettings = settings or PhysicsSettings()
         self._mujoco = load_mujoco()
         self._source = wrenches
@@ -137,7 +137,7 @@ class MujocoSimulator:
         self._mujoco.set_mju_user_warning(_quiet)  # else it writes a log file here
         self._mujoco.mj_step(self._model, data)
         self._mujoco.set_mju_user_warning(shown)
-        warned = self._fatal_warnings() if self._warnings.any() else []
+        warned = self._fatal_warnings() if any(self._warnings.tolist()) else []
         if warned or not data.time > before:
             raise SimulatorStoppedError(
                 f"MuJoCo stopped ({', '.join(warned) or 'it reset itself'}): the motion diverged",
@@ -176,7 +176,7 @@ class MujocoSimulator:
 
     def _snapshot(self, *, measured: bool) -> Snapshot:
         turned = self._qpos[3:7]
-        q = np.empty(self._stance.robot.model.nq)
+        q = np.empty(self._nq)
         q[:3], q[3:6], q[6] = self._qpos[:3], turned[1:], turned[0]
         angles = self._qpos[self._positions]
         if len(self._round):
@@ -187,7 +187,7 @@ class MujocoSimulator:
             q[7:] = angles
         v = self._qvel[self._columns].copy()
         # MuJoCo's base: linear velocity in world axes, angular in its own.
-        v[:3] = v[:3].dot(pin.Quaternion(*turned.tolist()).matrix())
+        v[:3] = _turned_back(turned.tolist(), v[:3].tolist())
         rotations = self._site_axes[self._sites].copy()
         positions = self._site_positions[self._sites].copy()
         if measured:
@@ -241,6 +241,13 @@ def _indices(found: list[int]) -> slice | Int[np.ndarray, " k"]:
     if found == list(range(first, first + len(found))):
         return slice(first, first + len(found))
     return np.array(found, dtype=int)
+
+
+def _turned_back(quaternion: list[float], vector: list[float]) -> tuple[float, float, float]:
+    """R' v for the rotation R of a quaternion (w, x, y, z); a matrix would take far longer."""
+    (w, x, y, z), (a, b, c) = quaternion, vector
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return a - w * p + y * r - z * q, b - w * q + z * p - x * r, c - w * r + x * q - y * p
 
 
 def _quiet(message: str) -> None:

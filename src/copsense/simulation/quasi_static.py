@@ -12,10 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.controllers.target import Signal
+from copsense.rigid_body import momentum_map
 from copsense.stance import Stance
 
 STATIC_SHARE = 0.05  # of the CoM's motion: up to here statics are called good enough
@@ -51,11 +51,11 @@ def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Sign
         tangent: dq/dcoordinate there (nv,).
         signal: the coordinate, relative to the start, as a function of time.
     """
-    model, mass = stance.robot.model, stance.robot.mass
+    mass = stance.robot.mass
     g = stance.robot.weight / mass
     ground = float(np.mean([place.translation[2] for place in stance.placements]))
     height = float(stance.com[2]) - ground
-    _, _, _, ax, ay, _ = pin.computeCentroidalMap(model, model.createData(), stance.q) @ tangent
+    _, _, _, ax, ay, _ = momentum_map(stance.robot, stance.q) @ tangent
     vx, vy, _ = stance.com_jacobian @ tangent
     speed = math.hypot(vx, vy)
     if speed == 0:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits
+from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 from copsense.statics.constrained import (
     ActiveLimit,
     ActiveSetChange,
@@ -23,7 +23,7 @@ from copsense.statics.equilibrium import (
     solve_static,
     with_tie_break,
 )
-from copsense.statics.policy import WrenchPolicy, policy_name, wrench_policy
+from copsense.statics.policy import WrenchPolicy, named_criteria, policy_name, wrench_policy
 
 __all__ = [
     "PROJECT",
@@ -36,6 +36,7 @@ __all__ = [
     "WrenchPolicy",
     "distance_to_change",
     "is_admissible",
+    "named_criteria",
     "policy_name",
     "share_load",
     "solve_equilibrium",
@@ -62,7 +63,9 @@ def solve_equilibrium(
         InvalidInputError: weights that do not fit, a policy whose wrenches do not balance gravity,
             or a policy together with limits.
     """
-    if limits is None or not limits.any:
+    check_stance(stance)
+    limits = optional_limits(limits)
+    if limits is None:
         return solve_static(stance, criterion)
     if not isinstance(criterion, Criterion):
         raise InvalidInputError(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from copsense.arrays import finite_array
+from copsense.criterion import Criterion, check_criterion
 from copsense.errors import CopsenseError, InvalidInputError, UndeterminedWrenchError
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
@@ -60,6 +63,47 @@ def policy_name(policy: object) -> str:
             "such as criterion_named('minimum-torque')."
         )
     return str(getattr(policy, "__name__", type(policy).__name__))
+
+
+@overload
+def named_criteria(
+    criteria: Iterable[Criterion], what: str, *, policies: Literal[False]
+) -> dict[str, Criterion]: ...
+@overload
+def named_criteria(
+    criteria: Iterable[Criterion | WrenchPolicy], what: str
+) -> dict[str, Criterion | WrenchPolicy]: ...
+def named_criteria(
+    criteria: Any, what: str, *, policies: bool = True
+) -> Mapping[str, Criterion | WrenchPolicy]:
+    """Criteria by their names, in the order given.
+
+    Args:
+        criteria: criteria or policies of distinct names, at least one.
+        what: how the message calls what needs them, such as ``"a sweep"``.
+        policies: whether policies q -> wrenches may be among them, and there has to be one at all.
+
+    Raises:
+        InvalidInputError: not a list of criteria and policies, or two have one name.
+    """
+    if isinstance(criteria, Criterion) or callable(criteria):
+        kind = "criterion" if isinstance(criteria, Criterion) else "policy"
+        raise InvalidInputError(f"criteria is a single {kind}. Give a list of them.")
+    if not isinstance(criteria, Iterable) or isinstance(criteria, str):
+        raise InvalidInputError(
+            f"{reprlib.repr(criteria)} is not a list of criteria. Give one, such as "
+            "[minimum_wrench(1.0), minimum_torque()]."
+        )
+    chosen = tuple(criteria)
+    for each in chosen if not policies else ():
+        check_criterion(each)
+    names = [c.name if isinstance(c, Criterion) else policy_name(c) for c in chosen]
+    if (policies and not names) or len(set(names)) != len(names):
+        raise InvalidInputError(
+            f"{what} needs criteria of distinct names, got {', '.join(names) or 'none'}. Give at "
+            "least one; Criterion.named(...) renames one."
+        )
+    return dict(zip(names, chosen, strict=True))
 
 
 def policy_forces(stance: Stance, policy: WrenchPolicy) -> np.ndarray:

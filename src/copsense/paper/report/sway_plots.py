@@ -27,7 +27,6 @@ from copsense.polygon import Polygon
 from copsense.simulation import Recording
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
-_SETTLED = 0.1  # s until the ground carries the weight evenly
 _TIP: dict[str, Any] = {"color": "#b3261e", "linewidth": 1.1, "linestyle": (0, (4, 2))}
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 
@@ -97,8 +96,7 @@ def plot_sway_hip_roll(
     for name, runs in recordings.items():
         for run in runs:
             left = int(np.argmax(run["contact_position"].sel(com_axis="y").values))
-            tip = float(run.attrs["tip_time"])
-            standing = run.sel(time=slice(_SETTLED, tip if np.isfinite(tip) else None))
+            standing = run.before_first_tip.settled
             angle = standing["joint_position"].sel(joint=joint).values * DEG
             there = run["static_joint"].sel(joint=joint).values * DEG
             shown = (there >= angle.min() - 0.1) & (there <= angle.max() + 0.1)
