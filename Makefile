@@ -34,6 +34,7 @@ help: ## list the targets
 
 .PHONY: demo
 demo: $(RUN_STAMP) ## reproduce the paper; print where the report is
+	@mkdir -p $(dir $(REPRODUCTION))
 	@$(BIN)/copsense reproduce --output $(REPRODUCTION) --force
 
 .PHONY: test

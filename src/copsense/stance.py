@@ -148,11 +148,13 @@ class Stance:
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
         """The same robot, configuration and loads on other contacts."""
-        return Stance(self.robot, self.q, contacts, loads=self.loads)  # type: ignore[arg-type]
+        given = tuple(contacts) if isinstance(contacts, Iterable) else contacts
+        return Stance(self.robot, self.q, given, loads=self.loads)
 
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
-        return Stance(self.robot, self.q, self.contacts, loads=tuple(loads))
+        given = tuple(loads) if isinstance(loads, Iterable) else loads
+        return Stance(self.robot, self.q, self.contacts, loads=given)
 
     @property
     def contact_names(self) -> tuple[str, ...]:

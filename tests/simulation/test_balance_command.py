@@ -209,7 +209,7 @@ def test_bad_options_are_one_clear_line(options, says):
 
 
 def test_gains_from_the_command_can_be_too_much():
-    answer = copsense("balance", "icub", "--duration", 1, "--gain", "com-damping=-40", "--json")
+    answer = copsense("balance", "icub", "--duration", 1, "--gain", "com-stiffness=1e6", "--json")
     assert answer.code == 1
     end = answer.json["end"]
     assert "diverged" in end["reason"]

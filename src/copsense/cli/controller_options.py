@@ -70,7 +70,7 @@ def read_gains(name: str, changes: tuple[str, ...], robot: Robot) -> Gains:
     for changed, value in read_assignments(changes, "NAME=VALUE, such as com-damping=14").items():
         if changed not in names:
             raise UnknownNameError("gain", changed, names)
-        if not value >= 0:
+        if value < 0:  # what is not a number is for the gains to reject
             raise InvalidInputError(
                 f"the gain {changed} is {value:g}: it would push the robot over. Give a number "
                 "that is not negative."

@@ -152,9 +152,9 @@ def read_stance(
         echo_notes(stance.robot.notes)
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
     if not robot:
-        raise InvalidInputError(
-            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE; "
-            "see --help."
+        raise click.UsageError(
+            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE.",
+            click.get_current_context(silent=True),
         )
     check_package_dirs(package_dirs)  # a preset looks none up
     if sole_height is not None:

@@ -22,6 +22,6 @@ def command():
 @pytest.fixture(scope="session")
 def folder(reproduction, tmp_path_factory):
     """The folder of the report, which no test changes."""
-    folder = tmp_path_factory.mktemp("written") / "deep" / "report"
+    folder = tmp_path_factory.mktemp("written") / "report"
     assert write_report(reproduction, folder, command=COMMAND) == folder / "report.html"
     return folder
