@@ -109,6 +109,7 @@ def test_an_absolute_path_is_taken_as_it_is(package, scheme):
 
 def test_a_missing_mesh_names_every_place_and_what_to_give(package, tmp_path):
     path = put(package, "package://tiny_robot/meshes/fot.stl")
+    (tmp_path / "mine").mkdir()
     with pytest.raises(ModelLoadError) as caught:
         sole(path, package_dirs=[tmp_path / "mine"])
     said = str(caught.value)

@@ -124,10 +124,11 @@ class Robot:
             if not (np.all(np.abs(numbers[i]) < _ABSURD) and np.all(np.abs(placed[i]) < _ABSURD))
         ]
         if bad:
+            finite = all(np.isfinite(each).all() for each in (*numbers, *placed))
+            what = f"beyond {_ABSURD:g} m or kg m^2" if finite else "not finite"
             raise InvalidInputError(
-                f"robot {self.name!r} has a centre of mass, inertia or placement that is not "
-                f"finite, or beyond {_ABSURD:g} m or kg m^2, at {', '.join(bad)}. Correct the "
-                "model."
+                f"robot {self.name!r} has a centre of mass, inertia or placement that is {what} at "
+                f"{', '.join(bad)}. Correct the model."
             )
         if not 0 < np.linalg.norm(model.gravity.linear) < np.inf:
             raise InvalidInputError(

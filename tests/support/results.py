@@ -27,7 +27,7 @@ from copsense.maps.sampling import Axis, Grid
 from copsense.margins import margin_table
 from copsense.path import LateralPath
 from copsense.pushes import push_limits
-from copsense.robots import PRESETS
+from copsense.robots import PRESETS, inspect_robot
 from copsense.scan import limit_travel, next_active_set_change
 from copsense.simulation import ModelError, Scenario
 from copsense.simulation.prediction import predict
@@ -100,6 +100,7 @@ def all_results(icub) -> dict[str, object]:
         "margin": icub.contacts[0].sole.margin((0.0, 0.0)),
         "analysis": copsense.analyse(bar, None, copsense.Limits()),
         "regions": copsense.com_regions(icub, [LENGTH], LIMITS, tolerance=1e-2),
+        "inspection": inspect_robot(copsense.load_robot("solo12")),
         "pushes": push_limits(icub, "chest", [LENGTH], LIMITS),
         "design": copsense.design_criterion(path, copsense.Limits(), LENGTHS, grid=2),
         **{f"family {name}": family for name, family in families(icub).items()},

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from copsense.contact import Contact, rectangle
+from copsense.content import freeze
 from copsense.errors import CopsenseError
 from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt
@@ -45,6 +46,10 @@ class AnalyseLine:
     base_rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
     posture: Mapping[str, float] = field(default_factory=dict)
     package_dirs: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Own the posture."""
+        freeze(self, "posture")
 
     def __str__(self) -> str:
         """The line, quoted for a shell."""

@@ -10,6 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.contact import Contact
+from copsense.content import freeze
 from copsense.errors import CopsenseError, ModelLoadError
 from copsense.polygon import Polygon
 from copsense.robot import Robot
@@ -48,6 +49,10 @@ class Foot:
     contact: Contact
     middle: Float[np.ndarray, " 3"]
     reason: str = ""
+
+    def __post_init__(self) -> None:
+        """Own the middle."""
+        freeze(self, "middle")
 
     def __str__(self) -> str:
         """The frame and the sole under it."""

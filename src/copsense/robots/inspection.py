@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.content import ShortRepr
 from copsense.json_data import json_data
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
@@ -67,8 +68,8 @@ class InspectedJoint:
         return f"{span:26}  {drive}{spring}{follows}"
 
 
-@dataclass(frozen=True, eq=False)
-class Inspection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Inspection(ShortRepr):
     """What `inspect_robot` found.
 
     Attributes:
