@@ -160,7 +160,7 @@ class Quantity(_ParamType):
     def __init__(self, unit: Unit) -> None:
         """Remember what is meant, such as ``"rad"`` or ``"m"``."""
         self.unit: Unit = unit
-        self.name = _KINDS[unit].name
+        self.name: str = _KINDS[unit].name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """The SI number; a default that is a number already is kept."""

@@ -48,20 +48,25 @@ class SupportProgram:
         """
         r = slope.shape[1]
         A, bound = rows.over_forces(problem)
-        self.names = rows.all_names
+        self.names: tuple[str, ...] = rows.all_names
         # Of the torque rows s tau <= t, z moves tau_0.
         moved = np.zeros((len(A), r))
         if torque_slope is not None and len(rows.joint):
             moved[len(A) - len(rows.joint) :] = rows.sign[:, None] * torque_slope[rows.joint]
         E = np.hstack([problem.base_map, -slope / weight])
-        self.x0 = np.linalg.lstsq(E, problem.base_wrench / weight, rcond=None)[0]
-        self.N = scipy.linalg.null_space(E)
-        self.r, self.weight = r, weight
+        self.x0: Float[np.ndarray, " v"] = np.linalg.lstsq(
+            E, problem.base_wrench / weight, rcond=None
+        )[0]
+        self.N: Float[np.ndarray, "v z"] = scipy.linalg.null_space(E)
+        self.r: int = r
+        self.weight: float = weight
         cut = np.hstack([np.zeros((r, E.shape[1] - r)), np.eye(r)])
         full = np.vstack([np.hstack([A, moved / weight]), cut, -cut])
-        self.scale = np.maximum(np.linalg.norm(full, axis=1), _SHORTEST)
-        self.A = np.ascontiguousarray(full @ self.N / self.scale[:, None])
-        self.b = (np.append(bound / weight, np.full(2 * r, box)) - full @ self.x0) / self.scale
+        self.scale: Float[np.ndarray, " k"] = np.maximum(np.linalg.norm(full, axis=1), _SHORTEST)
+        self.A: Float[np.ndarray, "k z"] = np.ascontiguousarray(full @ self.N / self.scale[:, None])
+        self.b: Float[np.ndarray, " k"] = (
+            np.append(bound / weight, np.full(2 * r, box)) - full @ self.x0
+        ) / self.scale
 
     def farthest(self, direction: Float[np.ndarray, " r"]) -> Float[np.ndarray, " r"]:
         """The feasible z that lies farthest along a direction.
