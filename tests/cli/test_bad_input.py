@@ -72,7 +72,7 @@ from copsense.files import load_configurations
         ("four-bar --hip-weight -1", "--hip-weight is -1"),
         ("four-bar --ankle-weight nan", "--ankle-weight is nan"),
         ("balance icub --gain com-stiffness=-3", "the gain com-stiffness is -3"),
-        ("balance icub --gain com-damping=nan", "the gain com-damping is nan"),
+        ("balance icub --gain com-damping=nan", "gain com_damping is not finite"),
         ("analyse icub --package-dir absent", "no folder 'absent' to look"),
         ("design icub --com-y 0:1:1", "a path of 5 postures or more, this one has 1"),
         ("reproduce --output absent/report", "Create it first"),

@@ -53,7 +53,7 @@ from copsense.errors import InvalidInputError
 @click.option("--force", is_flag=True, help="Overwrite the pictures.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def analyse(
-    robot: str,
+    robot: str | None,
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,

@@ -84,7 +84,7 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
 @click.option("--force", is_flag=True, help="Overwrite the outputs.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def balance(
-    robot: str,
+    robot: str | None,
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Overwrite the picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, with the Pareto set.")
 def design(
-    robot: str,
+    robot: str | None,
     limits: str | None,
     family: str,
     objective: Any,

@@ -80,7 +80,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Overwrite the picture; a store is never overwritten.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def map_command(
-    robot: str,
+    robot: str | None,
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,

@@ -31,7 +31,7 @@ from copsense.cli.stance_options import read_stance, stance_options
 @click.option("--force", is_flag=True, help="Overwrite the picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def push(
-    robot: str,
+    robot: str | None,
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,

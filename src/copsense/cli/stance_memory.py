@@ -35,7 +35,7 @@ def remembered_stance() -> StanceFile | None:
 def written(
     stance: Stance,
     path: str | None,
-    source: str | Path,
+    source: str | Path | None,
     overwrite: bool,
     package_dirs: Iterable[str] = (),
 ) -> Stance:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def stance_options(command: F) -> F:
     """The robot, how it stands, and what it must respect."""
     options = [
-        click.argument("robot", required=False, default=""),
+        click.argument("robot", required=False),
         click.option(
             "--stance",
             "stance_file",
@@ -115,7 +115,7 @@ def stance_options(command: F) -> F:
 
 
 def read_stance(
-    robot: str,
+    robot: str | None,
     contacts: tuple[str, ...],
     contact_at: Any,
     soles: Any,
@@ -143,7 +143,9 @@ def read_stance(
     file = remembered_stance()
     if file is not None:
         placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
-        if robot or any(value not in (None, ()) for value in (*placed, base_rpy, *drives.values())):
+        if robot is not None or any(
+            value not in (None, ()) for value in (*placed, base_rpy, *drives.values())
+        ):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
                 "option. Give one of them."
@@ -151,7 +153,7 @@ def read_stance(
         stance = file.stance()
         echo_notes(stance.robot.notes)
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
-    if not robot:
+    if robot is None:
         raise click.UsageError(
             "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE.",
             click.get_current_context(silent=True),

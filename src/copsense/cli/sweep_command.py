@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Overwrite the output.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def sweep(
-    robot: str,
+    robot: str | None,
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,
