@@ -139,9 +139,7 @@ class Closures(ShortRepr):
                 on_b = pin.Force(part, np.zeros(3))
                 on_a = pin.Force(a.rotation.T @ b.rotation @ part, np.zeros(3))
             for attached, force in ((pair.a, on_a), (pair.b, -on_b)):
-                spatial = attached.placement.act(force)
-                joint = attached.joint
-                found[joint] = found[joint] + spatial if joint in found else spatial
+                rigid_body.add_force(found, attached.joint, attached.placement.act(force))
         return found
 
     def turning(self, lam: Float[np.ndarray, " l"]) -> Float[np.ndarray, "nv nv"]:

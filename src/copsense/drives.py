@@ -216,12 +216,12 @@ class Drives(ShortRepr):
             InvalidInputError: a coupling or transmission would be torn apart.
         """
         kept = set(joints)
-        tied = [((c.joint, c.of), c) for c in self.couplings]
-        tied += [(each.joints, each) for each in self.transmissions]  # type: ignore[misc]
-        for names, _ in tied:
+        tied = [{coupling.joint, coupling.of} for coupling in self.couplings]
+        tied += [set(each.joints) for each in self.transmissions]
+        for names in tied:
             free = kept.intersection(names)
-            if free and len(free) < len(set(names)):
-                locked = ", ".join(sorted(set(names) - kept))
+            if free and len(free) < len(names):
+                locked = ", ".join(sorted(names - kept))
                 raise InvalidInputError(
                     f"{locked} cannot be locked while {', '.join(sorted(free))} moves: they are "
                     "coupled. Lock all of them, or none."

@@ -141,8 +141,7 @@ def apply_loads(
         if isinstance(load, SpringLoad) or load.fixed_to == "world":
             derivative -= turning(J, own)
         joint, placement = attachments[k]
-        spatial = placement.act(pin.Force(own))
-        forces[joint] = forces[joint] + spatial if joint in forces else spatial
+        rigid_body.add_force(forces, joint, placement.act(pin.Force(own)))
     points = np.array([here.translation for here in places]).reshape(-1, 3)
     return AppliedLoads(
         read_only(balanced),

@@ -244,6 +244,16 @@ class Polygon:
         once = [p for i, p in enumerate(kept) if p != kept[i - 1] or len(kept) == 1]
         return Polygon(np.array(once or kept[:1]).reshape(-1, 2))
 
+    def within(
+        self, normals: Float[np.ndarray, "r 2"], offsets: Float[np.ndarray, " r"]
+    ) -> Polygon:
+        """The part where normals p <= offsets, the normals of any length but zero."""
+        left = self
+        for n, offset in zip(normals, offsets, strict=True):
+            length = np.linalg.norm(n)
+            left = left.clip(n / length, offset / length)
+        return left
+
     def section(self, axis: str, at: float) -> tuple[float, float] | None:
         """Where the line along an axis, the other coordinate being `at` [m], enters and leaves.
 

@@ -279,9 +279,7 @@ def _criterion_pushes(
     corners = LARGEST * weight * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     if np.any(offsets[still] < -_STILL * weight):
         corners = corners[:0]
-    left = Polygon(corners)
-    for n, offset, length in zip(normals[~still], offsets[~still], size[~still], strict=True):
-        left = left.clip(n / length, offset / length)
+    left = Polygon(corners).within(normals[~still], offsets[~still])
     left = Polygon.merged(left.vertices, _MERGE * weight)
     # Which row each edge of the intersection is.
     names = np.array(rows.all_names, dtype=object)[~still]

@@ -34,6 +34,11 @@ class Attachment(NamedTuple):
     placement: pin.SE3
 
 
+def add_force(forces: dict[int, pin.Force], joint: int, force: pin.Force) -> None:
+    """Add a spatial force on a joint, in its axes, to those that act on it already."""
+    forces[joint] = forces[joint] + force if joint in forces else force
+
+
 class _Scratch:
     """Working memory for one robot in one thread."""
 

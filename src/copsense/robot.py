@@ -313,27 +313,6 @@ class Robot:
         return self.drives.on(self.dof_names)
 
     @cached_property
-    def joint_forces(self) -> tuple[JointForce, ...]:
-        """Springs and held torques on the joints, in the order of the velocities."""
-        springs, held = self.drives.springs, self.drives.held
-        found = []
-        for joint in self.dof_names:
-            if joint in springs or joint in held:
-                model_joint = self.model.joints[self.joint_id(joint)]
-                spring = springs.get(joint, Spring(0.0))
-                found.append(
-                    JointForce(
-                        int(model_joint.idx_v),
-                        int(model_joint.idx_q),
-                        int(model_joint.nq),
-                        float(held.get(joint, 0.0)),
-                        float(spring.stiffness),
-                        float(spring.rest),
-                    )
-                )
-        return tuple(found)
-
-    @cached_property
     def torque_names(self) -> tuple[str, ...]:
         """One label per entry of the torques: the motor, named as its joint unless told else."""
         return self.dof_names if self.actuation is None else self.actuation.motors
@@ -495,6 +474,17 @@ class Robot:
             raise UnknownNameError(f"frame in robot {self.name!r}", name, self.frame_names)
         return self._frame_ids[name]
 
+    def joint_forces(self, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " nv"]:
+        """Torques of the springs and of what is held on the joints (nv,) [Nm, or N]."""
+        found, drives = np.zeros(self.model.nv), self.drives
+        for joint in {**drives.springs, **drives.held}:
+            spring = drives.springs.get(joint, Spring(0.0))
+            stretch = self.joint_position(q, joint) - spring.rest
+            found[self.velocity_index(joint)] = (
+                drives.held.get(joint, 0.0) - spring.stiffness * stretch
+            )
+        return found
+
     def frame(self, name: str) -> pin.Frame:
         """The frame of the model that `frame_id` finds."""
         return self.model.frames[self.frame_id(name)]
@@ -570,33 +560,6 @@ class Payload:
     frame: str
     mass: float
     com: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True)
-class JointForce:
-    """A spring and a held torque on one joint: torque - stiffness (q - rest).
-
-    Attributes:
-        velocity: where the joint stands in a velocity.
-        position: where it stands in a configuration.
-        size: its numbers there; 2 for a joint that turns without end (cosine, sine).
-        torque: held [Nm, or N].
-        stiffness: [Nm/rad, or N/m].
-        rest: [rad, or m].
-    """
-
-    velocity: int
-    position: int
-    size: int
-    torque: float
-    stiffness: float
-    rest: float
-
-    def force(self, q: Float[np.ndarray, " nq"]) -> float:
-        """The torque on the joint at a configuration [Nm, or N]."""
-        here = q[self.position : self.position + self.size]
-        now = float(here[0] if self.size == 1 else np.arctan2(here[1], here[0]))
-        return self.torque - self.stiffness * (now - self.rest)
 
 
 def _build_urdf(description: Description) -> pin.Model:

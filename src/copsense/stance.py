@@ -209,14 +209,13 @@ class Stance:
 
         Gravity less the loads, the springs of the joints and the torques held on them.
         """
-        if not self.loads and not self.robot.joint_forces:
+        drives = self.robot.drives
+        if not (self.loads or drives.springs or drives.held):
             return self.gravity
         found = np.array(self.gravity)
         if self.applied is not None:
             found -= self.applied.balanced
-        for joint in self.robot.joint_forces:
-            found[joint.velocity] -= joint.force(self.q)
-        return found
+        return found - self.robot.joint_forces(self.q)
 
     @cached_property
     def applied(self) -> AppliedLoads | None:
@@ -462,22 +461,19 @@ class Stance:
             wrench = wrenches[k]
             if self._layout.fixed_axes[k] is not None:
                 wrench = np.concatenate([self._turn(k).T @ wrench[:3], np.zeros(3)])
-            force = placement.act(pin.Force(wrench))
-            external[joint] = external[joint] + force if joint in external else force
+            rigid_body.add_force(external, joint, placement.act(pin.Force(wrench)))
         return external
 
     def spatial_forces(self, forces: Float[np.ndarray, " c"]) -> dict[int, pin.Force]:
         """Stacked forces and the loads as spatial forces, as `joint_wrenches`."""
         found = self.joint_wrenches(forces)
         for joint, force in self.applied.forces.items() if self.applied else ():
-            found[joint] = found[joint] + force if joint in found else force
+            rigid_body.add_force(found, joint, force)
         return found
 
     def joint_loads(self, forces: Float[np.ndarray, " c"]) -> Float[np.ndarray, " nv"]:
         """Springs, held torques and couplings: what acts between joints (nv,) [Nm, or N]."""
-        found = np.zeros(self.robot.model.nv)
-        for joint in self.robot.joint_forces:
-            found[joint.velocity] += joint.force(self.q)
+        found = self.robot.joint_forces(self.q)
         count = len(self.robot.drives.couplings)
         if self.closures is not None and count:
             lam = self.loop_forces(forces)
@@ -512,8 +508,9 @@ class Stance:
         if applied is not None:
             derivative += applied.derivative
         if gravity is None:
-            for joint in self.robot.joint_forces:
-                derivative[joint.velocity, joint.velocity] += joint.stiffness
+            for joint, spring in self.robot.drives.springs.items():
+                i = self.robot.velocity_index(joint)
+                derivative[i, i] += spring.stiffness
         if self.closures is not None and len(forces) > len(self.row_names):
             derivative -= self.closures.turning(self.loop_forces(forces))
         # Pinocchio turns the force with its joint. A surface does not turn; a point foot does, and

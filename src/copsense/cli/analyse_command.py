@@ -88,7 +88,7 @@ def analyse(
         )
     chosen = read_criteria(criteria, characteristic_length)
     # The posture that is analysed is the one to write down, not the one it started from.
-    kept, anew = options.pop("save_stance"), options.pop("force_stance")
+    kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
     home = read_stance(robot, **options)
     analysis = analyse_stance(
         home,
@@ -100,7 +100,7 @@ def analyse(
         joints=read_positions(joints, home.robot),
         check=check,
     )
-    written(analysis.stance, kept, robot, anew, options["package_dirs"])
+    written(analysis.stance, kept, robot, overwrite, options["package_dirs"])
     answer = analysis.to_dict()
     if regions is not None:
         assert within is not None

@@ -74,6 +74,7 @@ def four_bar(
     Axes as in the paper: x right, y up, left foot at -x, moments counter-clockwise. Wrenches are
     [fx, fy, mz], ground on foot [N, N, N m].
     """
+    from copsense.arrays import finite_number
     from copsense.paper import FOUR_BAR_CRITERIA, FourBar, solve_four_bar
 
     if criterion not in FOUR_BAR_CRITERIA:
@@ -83,8 +84,6 @@ def four_bar(
             f"--xi is {math.degrees(xi):g} degrees. Give an angle over 0 and under 180 degrees, at "
             "which the linkage is collapsed, such as 85, 85deg or 1.5rad; 90 stands upright."
         )
-    from copsense.arrays import finite_number
-
     for name, value in parameters.items():  # also of those that this criterion does not use
         finite_number(value, f"--{name.replace('_', '-')}", positive=True)
     own = {k: v for k, v in parameters.items() if k in FOUR_BAR_CRITERIA[criterion].defaults}

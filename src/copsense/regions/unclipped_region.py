@@ -74,9 +74,7 @@ def criterion_region(
         corners = np.array([[-BOX], [BOX]])
     if np.any(offsets[still] < -none[still]):
         corners = corners[:0]
-    left = Polygon(corners @ axes.T)
-    for n, offset, length in zip(normals[~still], offsets[~still], size[~still], strict=True):
-        left = left.clip(axes @ n / length, offset / length)
+    left = Polygon(corners @ axes.T).within(normals[~still] @ axes.T, offsets[~still])
     corners = stance.com[:2] + left.vertices
     return region_between(stance, corners, corners, interval=axes.shape[1] == 1)
 
