@@ -5,9 +5,10 @@ The one statement of "share this load": with f the stacked contact forces and ta
     base_map f = base_wrench        tau = torque_offset - joint_map f
 
 At rest base_map = J_b', joint_map = J_j' and the right-hand sides are gravity's, G_b and G_j, less
-the loads. Joints without a motor stand among the base's rows; forces of loops and couplings stand
-behind the contacts'. A controller states its own (see `controllers.balancing`). What a criterion
-prefers among such f is `Quadratic.over_forces`; what limits allow, `LimitRows.over_forces`.
+the loads; in motion (`Stance.moving`) inertia is among them. Joints without a motor stand among the
+base's rows; forces of loops and couplings stand behind the contacts'. A controller states its own
+(see `controllers.balancing`). What a criterion prefers among such f is `Quadratic.over_forces`;
+what limits allow, `LimitRows.over_forces`.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class LoadProblem(ShortRepr):
 
     @classmethod
     def of(cls, stance: Stance) -> LoadProblem:
-        """The load of a stance at rest: its weight, and what else is known to act on it."""
+        """The load of a stance: its weight, its inertia, and what else is known to act on it."""
         robot = stance.robot
         nb, map_, N = robot.unactuated_nv, stance.constraints.T, stance.balance
         inertia = stance.mass_matrix[robot.base_nv :, robot.base_nv :]

@@ -17,7 +17,7 @@ from copsense.arrays import check_type, finite_number, read_only
 from copsense.content import freeze
 from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
-from copsense.stance import Stance, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
@@ -149,6 +149,7 @@ def lateral_sweep(
         `PosturePath.failures`.
     """
     check_stance(stance)
+    check_at_rest(stance, "a path of postures")
     if com_x is None and stance.robot.base_nv == 6:
         com_x = float(np.mean([world.translation[0] for world in stance.placements]))
     if com_x is not None:
@@ -197,6 +198,7 @@ class LateralPath:
             InvalidInputError: no length, or no posture.
         """
         check_stance(stance)
+        check_at_rest(stance, "a path of postures")
         reach = finite_number(reach, "the reach [m]", positive=True)
         if samples < 1:
             raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
@@ -262,6 +264,7 @@ def joint_sweep(
         progress: called with 1 after each posture.
     """
     check_stance(stance)
+    check_at_rest(stance, "a path of postures")
     robot = stance.robot
     now = robot.joint_position(stance.q, joint)
 
@@ -294,6 +297,7 @@ def path_through(
         InvalidInputError: no configuration, a bad one, or one with a contact over 1e-9 away.
     """
     check_stance(stance)
+    check_at_rest(stance, "a path of postures")
     stances: list[Stance] = []
     failures: dict[int, str] = {}
     check_type(configurations, Iterable, "a list of configurations", "Give one (nq,) each.")

@@ -14,7 +14,7 @@ from copsense.arrays import check_type, checked_positions, finite_array, finite_
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
-from copsense.stance import RANK_TOLERANCE, Stance, check_stance
+from copsense.stance import RANK_TOLERANCE, Stance, check_at_rest, check_stance
 
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 _STATIONARITY = 1e-11  # on the cost's gradient along the manifold
@@ -98,6 +98,7 @@ def solve_posture(
         UnknownNameError: a joint is not in the model.
     """
     check_stance(stance)
+    check_at_rest(stance, "a posture to search for")
     robot = stance.robot
     cost = cost or PostureCost()
     joints = checked_positions(joints, "joint positions")
@@ -201,6 +202,7 @@ def carry_payload(
         UnknownNameError: no such frame.
         UnreachablePostureError: the robot cannot bring the CoM of both there.
     """
+    check_at_rest(stance, "a payload")
     robot, (x, y, _) = stance.robot.with_payload(frame, mass, com=com), stance.com
     loaded = Stance(robot, stance.q, stance.contacts, loads=stance.loads)
     ahead = float(x) if robot.base_nv == 6 else None  # a planar robot has no x to keep

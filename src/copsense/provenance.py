@@ -132,6 +132,8 @@ def model_digest(stance: Stance) -> str:
     drives = stance.robot.drives
     if drives or stance.loads:
         found.update(json.dumps(plain([drives, list(stance.loads)])).encode())
+    if stance.motion is not None:
+        found.update(_bytes([stance.motion.velocity, stance.motion.acceleration]))
     return found.hexdigest()
 
 

@@ -31,7 +31,7 @@ from copsense.loads import Load, apply_loads
 from copsense.polygon import Polygon
 from copsense.regions.refinement import refine
 from copsense.regions.support_program import SupportProgram
-from copsense.stance import Stance, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, share_load
 
 if TYPE_CHECKING:
@@ -206,6 +206,7 @@ def push_limits(
         InvalidInputError: the robot lives in a plane, or limits that do not fit the stance.
     """
     check_stance(stance)
+    check_at_rest(stance, "a slow push")
     chosen = named_criteria(criteria, "a comparison of pushes", policies=False)
     robot = stance.robot
     if robot.base_nv != 6:

@@ -17,6 +17,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import owned
+from copsense.motion import Motion
 from copsense.robot import Robot
 
 _LOCAL = pin.ReferenceFrame.LOCAL
@@ -155,17 +156,26 @@ def link_momentum_rate(
     return owned(data.oMi[joint].act(inertia * data.a[joint] + inertia.vxiv(v)).vector)
 
 
-def torques_at_rest(
-    robot: Robot, q: Float[np.ndarray, " nq"], forces: Mapping[int, pin.Force]
+def inverse_dynamics(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    motion: Motion | None = None,
+    forces: Mapping[int, pin.Force] | None = None,
 ) -> Float[np.ndarray, " nv"]:
-    """G(q) less the generalised forces of spatial forces on joints, in their own axes.
+    """M dv/dt + C v + G less the generalised forces of spatial forces, in their joints' axes.
 
-    By inverse dynamics: it shares no step with `gravity` and the contacts' Jacobian.
+    It shares no step with `gravity` and the contacts' Jacobian.
+
+    Args:
+        robot: the robot.
+        q: configuration (nq,).
+        motion: velocity and acceleration; None at rest.
+        forces: joint of the model -> force in the joint's axes.
     """
     memory = _scratch(robot)
-    with _Applied(memory, forces):
-        still = memory.still
-        return owned(pin.rnea(memory.model, memory.data, q, still, still, memory.forces))
+    v, a = _rates(memory, motion)
+    with _Applied(memory, forces or {}):
+        return owned(pin.rnea(memory.model, memory.data, q, v, a, memory.forces))
 
 
 def static_torque_derivative(
@@ -187,6 +197,23 @@ def static_torque_derivative(
     with _Applied(memory, forces):
         found = pin.computeStaticTorqueDerivatives(model, memory.data, q, memory.forces)
         return np.array(found)
+
+
+def inverse_dynamics_derivatives(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    motion: Motion | None,
+    forces: Mapping[int, pin.Force],
+) -> tuple[Float[np.ndarray, "nv nv"], Float[np.ndarray, "nv nv"]]:
+    """Derivatives of `inverse_dynamics` by q and by v, at spatial forces that turn with joints.
+
+    Each at the other's, and the acceleration's, fixed numbers.
+    """
+    memory = _scratch(robot)
+    v, a = _rates(memory, motion)
+    with _Applied(memory, forces):
+        found = pin.computeRNEADerivatives(memory.model, memory.data, q, v, a, memory.forces)
+        return np.array(found[0]), np.array(found[1])
 
 
 def velocity_derivatives(
@@ -214,6 +241,13 @@ def inertia_derivative(
     at_rest = np.array(pin.computeGeneralizedGravityDerivatives(model, data, q))
     moving = pin.computeRNEADerivatives(model, data, q, memory.still, acceleration)[0]
     return np.asarray(moving - at_rest)
+
+
+def _rates(memory: _Scratch, motion: Motion | None) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and acceleration, zero at rest."""
+    if motion is None:
+        return memory.still, memory.still
+    return motion.velocity, motion.acceleration
 
 
 class _Applied:

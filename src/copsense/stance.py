@@ -28,6 +28,7 @@ from copsense.errors import (
     UnknownNameError,
 )
 from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads, turning
+from copsense.motion import Motion
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 from copsense.row_space import RowSpace
@@ -50,7 +51,7 @@ ANGLE_TOLERANCE = 1e-6  # rad
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stance:
-    """A robot at rest on its contacts, which do not move.
+    """A robot on its contacts, which do not move; at rest, or at an instant of a motion.
 
     Rows of `jacobian`, of stacked forces and of wrenches follow the contacts' order and, in each
     contact, its components among (fx, fy, fz, mx, my, mz) in contact axes. Columns are Pinocchio's
@@ -64,6 +65,7 @@ class Stance:
         q: configuration (nq,): base position, quaternion (x, y, z, w), joints.
         contacts: the contacts, at least one; kept as a tuple.
         loads: known forces on the robot beside its weight; kept as a tuple.
+        motion: how the robot moves, whose inertia is carried too; None at rest.
         check: False skips the checks of where the contacts lie and of what they can carry, for
             a solver's intermediate steps.
 
@@ -80,6 +82,7 @@ class Stance:
     contacts: Sequence[Contact]
     check: InitVar[bool] = True
     loads: Sequence[AnyLoad] = ()
+    motion: Motion | None = None
     _layout: _Layout = field(init=False)
     # World placement of the contact frames as the foot carries them, and their local Jacobians.
     _feet: tuple[pin.SE3, ...] = field(init=False)
@@ -144,17 +147,40 @@ class Stance:
 
     def at(self, q: ArrayLike, *, check: bool = True) -> Stance:
         """The same stance at another configuration."""
-        return Stance(self.robot, q, self.contacts, check, self.loads)  # type: ignore[arg-type]
+        place: Any = q
+        return Stance(self.robot, place, self.contacts, check, self.loads, self.motion)
 
     def with_contacts(self, contacts: Iterable[Contact]) -> Stance:
         """The same robot, configuration and loads on other contacts."""
         given = tuple(contacts) if isinstance(contacts, Iterable) else contacts
-        return Stance(self.robot, self.q, given, loads=self.loads)
+        return Stance(self.robot, self.q, given, loads=self.loads, motion=self.motion)
 
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
         given = tuple(loads) if isinstance(loads, Iterable) else loads
-        return Stance(self.robot, self.q, self.contacts, loads=given)
+        return Stance(self.robot, self.q, self.contacts, loads=given, motion=self.motion)
+
+    def moving(self, velocity: ArrayLike, acceleration: ArrayLike) -> Stance:
+        """The same stance in motion: what is solved on it carries the robot's inertia.
+
+        The wrenches, centres of pressure and margins are then those of the instant: the centre of
+        pressure of the whole robot is its zero-moment point. Derivatives over postures hold the
+        numbers of velocity and acceleration.
+
+        Args:
+            velocity: v (nv,), base in its own frame, then joints [m/s, rad/s]. Contacts at rest
+                ask for J v = 0, which is not checked.
+            acceleration: dv/dt (nv,), componentwise [m/s^2, rad/s^2].
+
+        Raises:
+            InvalidInputError: not finite numbers (nv,).
+        """
+        motion = Motion.of(self.robot, velocity, acceleration)
+        return Stance(self.robot, self.q, self.contacts, False, self.loads, motion)
+
+    def at_rest(self) -> Stance:
+        """The same stance without its motion."""
+        return Stance(self.robot, self.q, self.contacts, False, self.loads)
 
     @property
     def contact_names(self) -> tuple[str, ...]:
@@ -205,14 +231,17 @@ class Stance:
 
     @array_property
     def balance(self) -> Float[np.ndarray, " nv"]:
-        """N(q) [N, Nm], what motors, contacts and loops must balance.
+        """N [N, Nm], what motors, contacts and loops must balance.
 
-        Gravity less the loads, the springs of the joints and the torques held on them.
+        Gravity, and in motion inertia, less the loads, the springs of the joints and the torques
+        held on them.
         """
-        drives = self.robot.drives
+        drives, inertial = self.robot.drives, self.gravity
+        if self.motion is not None:
+            inertial = rigid_body.inverse_dynamics(self.robot, self.q, self.motion)
         if not (self.loads or drives.springs or drives.held):
-            return self.gravity
-        found = np.array(self.gravity)
+            return inertial
+        found = np.array(inertial)
         if self.applied is not None:
             found -= self.applied.balanced
         return found - self.robot.joint_forces(self.q)
@@ -483,12 +512,26 @@ class Stance:
     def balance_derivative(self, forces: Float[np.ndarray, " c"]) -> Float[np.ndarray, "nv nv"]:
         """A = d(N - J' f)/dq at fixed f in contact axes, along velocities of the model.
 
+        In motion at fixed numbers of velocity and acceleration; see `motion_load_rate`.
+
         Args:
             forces: stacked forces f (c,).
 
         Exact along admissible motions; for surface contacts everywhere.
         """
         return self._balance_derivative(forces, None)
+
+    def motion_load_rate(
+        self, velocity_rate: Float[np.ndarray, " nv"], acceleration_rate: Float[np.ndarray, " nv"]
+    ) -> Float[np.ndarray, " nv"]:
+        """How N changes as the numbers of velocity and acceleration do, at this configuration.
+
+        Args:
+            velocity_rate: change of v per unit of something (nv,).
+            acceleration_rate: change of dv/dt (nv,).
+        """
+        by_velocity = rigid_body.inverse_dynamics_derivatives(self.robot, self.q, self.motion, {})
+        return np.asarray(by_velocity[1] @ velocity_rate + self.mass_matrix @ acceleration_rate)
 
     def curvature(
         self, forces: Float[np.ndarray, " c"], gravity: Float[np.ndarray, " 3"]
@@ -504,7 +547,12 @@ class Stance:
     ) -> Float[np.ndarray, "nv nv"]:
         applied = self.applied if gravity is None else None
         external = self.spatial_forces(forces) if gravity is None else self.joint_wrenches(forces)
-        derivative = rigid_body.static_torque_derivative(self.robot, self.q, external, gravity)
+        if self.motion is None or gravity is not None:
+            derivative = rigid_body.static_torque_derivative(self.robot, self.q, external, gravity)
+        else:
+            derivative, _ = rigid_body.inverse_dynamics_derivatives(
+                self.robot, self.q, self.motion, external
+            )
         if applied is not None:
             derivative += applied.derivative
         if gravity is None:
@@ -661,6 +709,22 @@ def check_stance(stance: object) -> None:
     given = repr(stance) if isinstance(stance, str) else "..."
     remedy = f"Make one with copsense.load_stance({given})."
     check_type(stance, Stance, "a stance", remedy)
+
+
+def check_at_rest(stance: Stance, what: str) -> None:
+    """Reject a stance in motion where only one at rest makes sense.
+
+    Args:
+        stance: the stance.
+        what: what needs it, such as ``"a region of the CoM"``.
+
+    Raises:
+        InvalidInputError: it moves.
+    """
+    if stance.motion is not None:
+        raise InvalidInputError(
+            f"{what} is of a robot at rest, and this stance moves. Give stance.at_rest()."
+        )
 
 
 def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:

@@ -69,6 +69,7 @@ def all_results(icub) -> dict[str, object]:
     return {
         "stance": icub,
         "driven stance": driven,
+        "stance in motion": icub.moving(np.zeros(icub.robot.model.nv), icub.com_motions[:, 1]),
         "contact": icub.contacts[0],
         "limits": LIMITS,
         "rows of limits": limit_rows(icub, LIMITS),

@@ -24,7 +24,7 @@ from copsense.path import LateralPath
 from copsense.posture import solve_posture
 from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
-from copsense.stance import Stance, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import (
     StaticEquilibrium,
     WrenchPolicy,
@@ -227,6 +227,7 @@ def analyse(
         CopsenseError: a criterion has no solution here.
     """
     check_stance(stance)
+    check_at_rest(stance, "an analysis")
     within = optional_limits(limits)
     usual = (minimum_wrench(1.0), minimum_torque())
     chosen = named_criteria(usual if criteria is None else criteria, "an analysis")

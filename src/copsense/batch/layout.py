@@ -112,6 +112,8 @@ class RobotLayout(ShortRepr):
 def why_not_covered(stance: Stance) -> str:
     """Why the kernel does not serve a robot on its contacts; empty where it does."""
     robot, contacts, model = stance.robot, tuple(stance.contacts), stance.robot.model
+    if stance.motion is not None:
+        return "the stance moves"
     if stance.loads:
         return "there are loads beside the weight"
     if robot.drives:

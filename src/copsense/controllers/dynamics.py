@@ -7,7 +7,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.errors import InvalidInputError
-from copsense.stance import Stance
+from copsense.stance import Stance, check_at_rest
 
 _LOCAL = pin.ReferenceFrame.LOCAL
 
@@ -31,6 +31,7 @@ class StandingDynamics:
     def __init__(self, stance: Stance) -> None:
         """Look up the contacts' places on the robot."""
         robot = stance.robot
+        check_at_rest(stance, "a controller's stance")
         if robot.base_nv != 6 or any(c.kind == "planar" for c in stance.contacts):
             raise InvalidInputError(
                 f"robot {robot.name!r} lives in a plane: a momentum-based controller is spatial. "

@@ -15,7 +15,7 @@ from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
 from copsense.maps.sampling import Sample, Sampling
 from copsense.provenance import model_digest, plain
-from copsense.stance import Stance, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria
 
 FORMAT = 2  # of the store; counted up when what is written changes
@@ -44,6 +44,7 @@ class MapPlan(ShortRepr):
     def __post_init__(self) -> None:
         """Validate the criteria and the size of a chunk."""
         check_stance(self.stance)
+        check_at_rest(self.stance, "a map")
         object.__setattr__(self, "limits", optional_limits(self.limits))
         given = tuple(named_criteria(self.criteria, "a map").values())
         object.__setattr__(self, "criteria", given)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
 from copsense.rigid_body import base_axes
-from copsense.stance import Stance, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 
 _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 
@@ -43,6 +43,7 @@ def gravity_slope(stance: Stance) -> Float[np.ndarray, "nb 2"]:
 def com_axes(stance: Stance) -> Float[np.ndarray, "2 r"]:
     """Orthonormal horizontal directions in which the CoM may move: x and y, or a plane's own."""
     check_stance(stance)
+    check_at_rest(stance, "a region of the CoM")
     if stance.robot.base_nv == 6:
         return np.eye(2)
     u, size, _ = np.linalg.svd(gravity_slope(stance).T)

@@ -42,7 +42,7 @@ from copsense.robots.stance_tables import (
     read_posture,
     table_of,
 )
-from copsense.stance import Stance
+from copsense.stance import Stance, check_at_rest
 
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
@@ -219,6 +219,7 @@ def save_stance(
     """
     from copsense.robots.standing import load_robot
 
+    check_at_rest(stance, "a stance file")
     target = check_output(path, suffixes=(".toml",), overwrite=overwrite)
     source = _source_of(stance.robot) if robot is None else str(robot)
     folders = [str(folder) for folder in package_dirs]

@@ -18,7 +18,7 @@ from copsense.errors import InvalidInputError
 from copsense.robot import Robot
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.support_points import support_points
-from copsense.stance import Stance
+from copsense.stance import Stance, check_at_rest
 
 _POINT = 1e-4  # m: radius of the ball at each support point
 # m: how deep each ball starts in the ground. A contact that only touches carries no force in the
@@ -31,6 +31,7 @@ _SLIDES = ("JointModelP",)
 def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, sensors: bool) -> Any:
     """The compiled MuJoCo model of a stance."""
     robot, model = stance.robot, stance.robot.model
+    check_at_rest(stance, "the start of a simulation")
     if model.joints[1].shortname() != "JointModelFreeFlyer":
         raise InvalidInputError(
             f"robot {robot.name!r} moves in a plane, the simulation in space. Use a robot with a "

@@ -51,7 +51,8 @@ def solve_equilibrium(
     """The static equilibrium that a criterion chooses ([Romano2016] Eq. (7), (9), Remark 4).
 
     Args:
-        stance: robot, configuration and contacts.
+        stance: robot, configuration and contacts; in motion (`Stance.moving`) inertia is part of
+            the load, and the wrenches are those of the instant.
         criterion: a `Criterion`, or a callable q -> wrenches (nc, 6) in contact axes, such as a
             controller's own.
         limits: what the wrenches and torques must respect; None for nothing. With limits the

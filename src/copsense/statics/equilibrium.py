@@ -114,10 +114,12 @@ class StaticEquilibrium:
         return tuple(name for name, load in self._loads if load < -least)
 
     def residual(self) -> float:
-        """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics at rest."""
+        """Largest imbalance [N, Nm], recomputed from the stance by inverse dynamics."""
         stance, robot = self.stance, self.stance.robot
         needed = np.array(
-            rigid_body.torques_at_rest(robot, stance.q, stance.spatial_forces(self.forces))
+            rigid_body.inverse_dynamics(
+                robot, stance.q, stance.motion, stance.spatial_forces(self.forces)
+            )
         )
         needed -= stance.joint_loads(self.forces)
         needed[robot.base_nv :] -= self.joint_torques
