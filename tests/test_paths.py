@@ -3,9 +3,11 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from support import walkers
 from support.differences import largest_error
 
 import copsense
+import copsense.path
 from copsense.posture import contact_error
 
 MET = 1e-12  # m, rad
@@ -80,6 +82,64 @@ def test_joint_sweep_moves_the_joint_and_no_contact(stance_of, name, joint, star
 
     for row in (1, 4):
         assert tangent_error(at, path.values[row], path.tangents[row]) < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("name", "start", "stop", "free"), [("com_x", -0.03, 0.02, "z"), ("com_z", 0.5, 0.53, "")]
+)
+def test_a_com_sweep_moves_the_com_along_its_axis_alone(icub, name, start, stop, free):
+    path = copsense.path.com_sweep(icub, name, start, stop, 4)
+    assert (path.coordinate, path.unit, dict(path.failures)) == (name, "m", {})
+    assert contacts_moved(path, icub) < MET
+    axis = "xyz".index(name[-1])
+    coms = np.array([stance.com for stance in path.stances])
+    np.testing.assert_allclose(coms[:, axis], np.linspace(start, stop, 4), rtol=0, atol=MET)
+    middle = np.mean([place.translation for place in icub.placements], axis=0)
+    for other in {0, 1} - {axis}:
+        np.testing.assert_allclose(coms[:, other], middle[other], rtol=0, atol=MET)
+    assert (np.ptp(coms[:, 2]) > 1e-4) == (free == "z" or name == "com_z")
+
+    def at(value):
+        return copsense.path.com_sweep(icub, name, value, value, 1).stances[0]
+
+    # The knees bend fast near their straight end: steps finer than elsewhere.
+    assert tangent_error(at, path.values[1], path.tangents[1], h=3e-4) < 1e-7
+    np.testing.assert_allclose(
+        path.stances[1].com_jacobian[axis] @ path.tangents[1], 1.0, rtol=0, atol=1e-12
+    )
+
+
+def test_a_com_sweep_holds_what_it_is_told_to_hold(icub):
+    path = copsense.path.com_sweep(icub, "com_y", 0.0, 0.02, 2, held={"com_z": 0.52, "com_x": 0.01})
+    coms = np.array([stance.com for stance in path.stances])
+    np.testing.assert_allclose(coms, [[0.01, 0, 0.52], [0.01, 0.02, 0.52]], rtol=0, atol=MET)
+
+
+def test_a_com_sweep_leaves_alone_what_the_contacts_hold_fast():
+    # Legs that only pitch: no motion moves the CoM sideways, and it is not in the middle.
+    text = walkers.walker(walkers.PITCH_ONLY, trunk=(0.0, 0.01, 0.2))
+    with pytest.warns(UserWarning, match="not over the middle"):
+        stance = copsense.load_stance(
+            text, contacts=["l_foot", "r_foot"], contact_at="sole", posture=walkers.bent()
+        )
+    path = copsense.path.com_sweep(stance, "com_z", stance.com[2] - 0.02, stance.com[2], 2)
+    assert not path.failures
+    assert [s.com[1] for s in path.stances] == pytest.approx([stance.com[1]] * 2, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "coordinate", "held", "said"),
+    [
+        ("icub", "com_w", {}, "com_x, com_y"),
+        ("icub", "com_y", {"com": 0.1}, "com_x"),
+        ("icub", "com_y", {"com_y": 0.1}, "both swept and held"),
+        ("icub", "com_y", {"com_x": np.nan}, "com_x"),
+        ("four_bar", "com_x", {}, "lives in a plane"),
+    ],
+)
+def test_a_com_sweep_rejects_what_cannot_be_meant(stance_of, name, coordinate, held, said):
+    with pytest.raises(copsense.CopsenseError, match=said):
+        copsense.path.com_sweep(stance_of(name), coordinate, 0.0, 0.1, 2, held=held)
 
 
 def test_a_posture_out_of_reach_is_a_failure_and_the_others_stand(icub):

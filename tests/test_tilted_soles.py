@@ -3,14 +3,16 @@
 import warnings
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from support.commands import copsense as run
 from support.tiny import FEET, MJCF, urdf
 
 import copsense
 from copsense import Contact
-from copsense.errors import ModelLoadError
+from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.polygon import Polygon
-from copsense.sole import read_sole
+from copsense.sole import levelled, read_sole
 
 
 def tilted(roll=0.0, pitch=0.0, shape='<box size="0.2 0.1 0.02"/>'):
@@ -85,3 +87,64 @@ def test_any_line_is_a_polygon_whose_margin_is_to_its_nearer_end():
         sole = Contact("foot", polygon=ends).sole
         assert isinstance(sole, Polygon)
         assert sole.margin(point).distance == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(3.0, 0.0), (0.0, -7.0), (3.0, 4.0), (-12.0, 5.0)])
+def test_a_levelled_contact_lies_on_the_whole_of_its_sole(roll, pitch):
+    robot = copsense.Robot.from_urdf(tilted(roll, pitch))
+    contact = levelled(robot, Contact("left", offset=(0.01, 0.0, 0.0)))
+    box = pin.rpy.rpyToMatrix(*np.radians([roll, pitch, 0.0]))
+    # Corners are told apart to 1e-9 m, over edges of 0.1 m.
+    np.testing.assert_allclose(contact.normal, box[:, 2], rtol=0, atol=2e-8)
+    assert contact.offset == (0.01, 0.0, 0.0)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), box[:, 2]).matrix()
+    np.testing.assert_allclose(contact.rotation, turn, rtol=0, atol=2e-8)  # and no yaw
+    sole = read_sole(robot, contact)
+    assert sole.tilt == 0.0
+    assert Polygon(sole.polygon).area == pytest.approx(0.2 * 0.1, rel=1e-6)
+    assert sole.height == pytest.approx(-0.01, abs=1e-9)
+
+
+def test_a_level_sole_a_point_and_a_polygon_are_not_turned():
+    robot = copsense.Robot.from_urdf(tilted())
+    for contact in (Contact("left"), Contact("left", kind="point")):
+        assert levelled(robot, contact) is contact
+    with pytest.raises(InvalidInputError, match="Leave the polygon out"):
+        levelled(robot, Contact("left", polygon=copsense.rectangle((-0.1, 0.1), (-0.05, 0.05))))
+
+
+def test_a_sloping_capsule_is_levelled_to_its_line():
+    text = MJCF.replace(
+        '<geom type="box" size=".1 .05 .01"/>',
+        '<geom type="capsule" size=".02 .05" euler="0 96 0"/>',
+    )
+    robot = copsense.load_robot(text)
+    sole = read_sole(robot, levelled(robot, Contact("left")))
+    assert len(sole.polygon) == 2
+    assert sole.size[0] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_soles_are_levelled_in_python_in_a_stance_file_and_in_the_shell(tmp_path):
+    path = tmp_path / "tilted.urdf"
+    path.write_text(tilted(pitch=3.0), encoding="utf-8")
+    (tmp_path / "stance.toml").write_text(
+        'robot = "tilted.urdf"\ncontact_at = "sole"\nlevel_soles = true\n'
+        + "".join(f'[[contacts]]\nframe = "{foot}"\n' for foot in FEET),
+        encoding="utf-8",
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", copsense.robots.StandingWarning)  # legs of one joint
+        stance = copsense.load_stance(path, contacts=FEET, contact_at="sole", level_soles=True)
+        again = copsense.load_stance(tmp_path / "stance.toml")
+    np.testing.assert_allclose(again.q, stance.q, rtol=0, atol=1e-12)
+    # The feet stand on their soles, the links 3 degrees off.
+    assert stance.placements[0].rotation[2, 2] == pytest.approx(1.0, abs=1e-9)
+    feet = [word for foot in FEET for word in ("--contact", foot)]
+    said = run("analyse", path, *feet, "--contact-at", "sole", "--level-soles", "--json",
+               "--save-stance", tmp_path / "saved.toml")  # fmt: skip
+    assert "turned by 3.0 deg to lie flat" in said.err
+    saved = copsense.load_stance(tmp_path / "saved.toml")
+    np.testing.assert_allclose(saved.q, stance.q, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        saved.contacts[0].rotation, stance.contacts[0].rotation, rtol=0, atol=1e-12
+    )

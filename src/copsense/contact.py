@@ -54,6 +54,29 @@ class Plane:
         object.__setattr__(self, "point", tuple(float(c) for c in point))
         object.__setattr__(self, "normal", tuple(float(c) / length for c in normal))
 
+    @classmethod
+    def sloping(cls, roll: float = 0.0, pitch: float = 0.0, height: float = 0.0) -> Plane:
+        """A floor that slopes: Ry(pitch) Rx(roll) of a level one, as roll and pitch of a base.
+
+        Args:
+            roll: about the world's x [rad]; a positive one falls away to the right (-y).
+            pitch: about the world's y [rad]; a positive one falls away ahead (+x).
+            height: over the world's origin [m].
+
+        Raises:
+            InvalidInputError: an angle of a right angle or more: a wall has a normal.
+        """
+        for what, angle in (("roll", roll), ("pitch", pitch)):
+            steep = abs(finite_number(angle, f"the {what} of a slope [rad]")) >= np.pi / 2
+            _require(
+                not steep,
+                f"the {what} of a slope is {np.degrees(angle):.4g} degrees. Give less than 90, or "
+                "a wall by its normal, Plane(point, normal)",
+            )
+        normal = pin.rpy.rpyToMatrix(float(roll), float(pitch), 0.0)[:, 2]
+        x, y, z = (float(c) for c in normal)
+        return cls((0.0, 0.0, finite_number(height, "the height of a floor [m]")), (x, y, z))
+
     @property
     def axes(self) -> Float[np.ndarray, "3 3"]:
         """World axes of a point contact on it: z the normal, x as near to the world's x as can be.
@@ -178,6 +201,14 @@ class Contact(ShortRepr):
         offset, up = np.array(self.offset), self.normal
         x, y, z = (offset - (up @ offset) * up + height * up).tolist()
         return replace(self, offset=(x, y, z))
+
+    def turned(self, roll: float, pitch: float, yaw: float) -> Contact:
+        """The contact with its axes at Rz(yaw) Ry(pitch) Rx(roll) in the model's frame [rad].
+
+        Its offset stays.
+        """
+        angles = [float(a) for a in finite_array((roll, pitch, yaw), "roll, pitch, yaw", (3,))]
+        return replace(self, rotation=pin.rpy.rpyToMatrix(*angles))
 
     def on(self, robot: Robot) -> Attachment:
         """Where on a robot the contact is.

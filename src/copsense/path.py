@@ -15,10 +15,17 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import check_type, finite_number, read_only
 from copsense.content import freeze
-from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
+from copsense.errors import (
+    CopsenseError,
+    InvalidInputError,
+    UnknownNameError,
+    UnreachablePostureError,
+)
+from copsense.freedom import held_com_axes
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
 from copsense.stance import Stance, check_at_rest, check_stance
 
+COM_COORDINATES = ("com_x", "com_y", "com_z")  # of the centre of mass in the world [m]
 _MOST_POSTURES = 1_000_000  # of one sweep; more would fill the memory before they are done
 
 
@@ -148,15 +155,68 @@ def lateral_sweep(
         A path whose coordinate is ``com_y`` [m]. A posture out of reach is listed in
         `PosturePath.failures`.
     """
+    held = {} if com_x is None else {"com_x": com_x}
+    return com_sweep(stance, "com_y", start, stop, count, held=held, cost=cost, progress=progress)
+
+
+def com_sweep(
+    stance: Stance,
+    coordinate: str,
+    start: float,
+    stop: float,
+    count: int,
+    *,
+    held: Mapping[str, float] | None = None,
+    cost: PostureCost | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> PosturePath:
+    """Sweep the centre of mass along a world axis.
+
+    What is level and not swept is held over the mean of the contacts (or stays where it is, where
+    they let no motion change it), the height is free.
+
+    Args:
+        stance: the posture that every other stays nearest to.
+        coordinate: ``"com_x"``, ``"com_y"`` or ``"com_z"``.
+        start: its first value, in the world [m].
+        stop: its last [m].
+        count: number of postures.
+        held: coordinate -> where the CoM is held instead, or held as well [m].
+        cost: weights of the deviations from `stance`.
+        progress: called with 1 after each posture.
+
+    Returns:
+        A path over the coordinate [m]. A posture out of reach is listed in `PosturePath.failures`.
+
+    Raises:
+        UnknownNameError: a coordinate of another name.
+        InvalidInputError: the coordinate is held as well as swept, a value is not a number, or a
+            planar robot is to move out of its plane.
+    """
     check_stance(stance)
     check_at_rest(stance, "a path of postures")
-    if com_x is None and stance.robot.base_nv == 6:
-        com_x = float(np.mean([world.translation[0] for world in stance.placements]))
-    if com_x is not None:
-        com_x = finite_number(com_x, "com_x [m]")
+    fixed = dict(held or {})
+    for name in (coordinate, *fixed):
+        if name not in COM_COORDINATES:
+            raise UnknownNameError("coordinate of the CoM", str(name), COM_COORDINATES)
+        if name == "com_x" and stance.robot.base_nv != 6:
+            raise InvalidInputError(
+                f"robot {stance.robot.name!r} lives in a plane: its CoM has no x to choose. Sweep "
+                "com_y or com_z."
+            )
+    if coordinate in fixed:
+        raise InvalidInputError(f"{coordinate} is both swept and held. Leave it out of held.")
+    middle = np.mean([world.translation for world in stance.placements], axis=0)
+    level = COM_COORDINATES[0 if stance.robot.base_nv == 6 else 1 : 2]
+    fast = [COM_COORDINATES[axis] for axis in held_com_axes(stance)]
+    for name in level:
+        if name != coordinate and name not in fast:  # where contacts hold it, it stays
+            fixed.setdefault(name, float(middle[COM_COORDINATES.index(name)]))
+    where = [finite_number(fixed[n], f"{n} [m]") if n in fixed else None for n in COM_COORDINATES]
     values = _grid(start, stop, count)
-    solver = _Lateral(stance, com_x, cost)
-    return _sweep(stance, "com_y", "m", values, float(stance.com[1]), solver, progress)
+    axis = COM_COORDINATES.index(coordinate)
+    solver = _OfCom(stance, (where[0], where[1], where[2]), axis, cost)
+    return _sweep(stance, coordinate, "m", values, float(stance.com[axis]), solver, progress)
 
 
 def lateral_posture(
@@ -169,7 +229,7 @@ def lateral_posture(
         y: world y of the CoM [m].
         near: where to start the search; default `stance`.
     """
-    return _Lateral(stance, _held_x(stance), None)(y, near or stance)
+    return _lateral(stance)(y, near or stance)
 
 
 class LateralPath:
@@ -205,7 +265,7 @@ class LateralPath:
         self.stance = stance
         steps = np.linspace(-reach, reach, 2 * samples + 1)
         self.values: Float[np.ndarray, " p"] = read_only(float(stance.com[1]) + steps)
-        self._solver = _Lateral(stance, _held_x(stance), None)
+        self._solver = _lateral(stance)
         self._found: dict[float, tuple[Stance, np.ndarray] | str] = {}
 
     def __repr__(self) -> str:
@@ -358,17 +418,25 @@ def _held_x(stance: Stance) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Lateral:
-    """Postures of a lateral path; classes and not closures, so that a path can be sent away."""
+class _OfCom:
+    """Postures of a path of the CoM; classes and not closures, so that a path can be sent away."""
 
     stance: Stance
-    com_x: float | None
+    held: tuple[float | None, float | None, float | None]
+    axis: int
     cost: PostureCost | None
 
     def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-        com = (self.com_x, value, None)
-        found = solve_posture(near, com=com, reference=self.stance.q, cost=self.cost)
-        return found.stance, found.tangents[:, 0 if self.com_x is None else 1]
+        asked = list(self.held)
+        asked[self.axis] = value
+        found = solve_posture(near, com=asked, reference=self.stance.q, cost=self.cost)
+        column = sum(each is not None for each in asked[: self.axis])
+        return found.stance, found.tangents[:, column]
+
+
+def _lateral(stance: Stance) -> _OfCom:
+    """Postures of a lateral path: CoM x held where the stance has it."""
+    return _OfCom(stance, (_held_x(stance), None, None), 1, None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,18 +6,21 @@ from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact
 from copsense.content import ShortRepr, freeze
-from copsense.errors import ModelLoadError
+from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.polygon import Polygon
 from copsense.robot import Robot
 from copsense.shapes import Geometry, link_shapes, shape_points, whole_robot
 
 THICKNESS = 1e-3  # m: what lies within this of the lowest point belongs to the sole
+LEVEL = "turn the contact by its rotation, or level it (level_soles=True, --level-soles)"
 _STEEPEST = np.radians(30.0)  # a face that faces down within this may be a tilted underside
+_UP = (0.0, 0.0, 1.0)
 _TIP = 1 / 6  # share of its foot's outline under which a sole is hardly all of it
 
 
@@ -29,15 +32,20 @@ class Sole(ShortRepr):
         height: height of the lowest point over the frame, along the contact's z [m]; negative
             when the sole lies under the frame.
         polygon: convex hull (k, 2) of the lowest millimetre, counter-clockwise, contact axes [m].
-        tilt: angle [rad] between the contact's z and the underside, where the lowest millimetre is
-            a mere edge of it; zero where the sole lies flat.
+        upright: unit vector normal to the underside, away from the ground, contact axes, where the
+            lowest millimetre is a mere edge of it; the contact's z where the sole lies flat.
         footprint: length and width of all that is fixed to the frame, seen from above [m].
     """
 
     height: float
     polygon: Float[np.ndarray, "k 2"]
-    tilt: float = 0.0
+    upright: tuple[float, float, float] = _UP
     footprint: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def tilt(self) -> float:
+        """Angle between the contact's z and the underside [rad]; zero where the sole lies flat."""
+        return float(np.arctan2(np.hypot(self.upright[0], self.upright[1]), self.upright[2]))
 
     @property
     def size(self) -> tuple[float, float]:
@@ -83,17 +91,50 @@ def read_sole(
     lowest = float(vertices[:, 2].min())
     sole = vertices[vertices[:, 2] <= lowest + thickness]
     outline = Polygon.hull(sole[:, :2], f"the sole of contact {contact.name!r}")
-    tilt = _tilt(vertices, outline)
+    upright = _upright(vertices, outline)
     if len(outline) < 2:
+        tilt = Sole(lowest, outline.vertices, upright).tilt
         why = f", because {tilt_text(contact, tilt)}" if tilt else ""
-        remedy = "turn the contact by its rotation, use" if tilt else "Use"
+        remedy = f"{LEVEL}, use" if tilt else "Use"
         raise ModelLoadError(
             f"the {geometry} geometry under frame {contact.frame!r} touches the ground in a single "
             f"point: it has no sole{why}. {remedy[0].upper()}{remedy[1:]} a point contact, or give "
             "the polygon."
         )
     width, depth = np.ptp(vertices[:, :2], axis=0)
-    return Sole(lowest, outline.vertices, tilt, (float(width), float(depth)))
+    return Sole(lowest, outline.vertices, upright, (float(width), float(depth)))
+
+
+def levelled(robot: Robot, contact: Contact, *, geometry: Geometry = "collision") -> Contact:
+    """The contact with its frame turned, by the smallest rotation, until its sole lies flat.
+
+    A contact whose sole lies flat is returned as it is, as is one that is a point or whose
+    underside is more than 30 degrees off.
+
+    Args:
+        robot: a robot read from URDF or MJCF.
+        contact: its offset stays, its polygon must not be given.
+        geometry: ``"collision"``, or ``"visual"`` where a URDF has no other.
+
+    Raises:
+        ModelLoadError: a mesh is missing, or the link has no such geometry.
+        InvalidInputError: the contact has a polygon, which is in the axes that would turn.
+    """
+    if contact.kind == "point":
+        return contact
+    if contact.polygon is not None:
+        raise InvalidInputError(
+            f"contact {contact.name!r} has a polygon in its own axes, so they cannot be turned "
+            "until the sole lies flat. Leave the polygon out to have it read, or do not level."
+        )
+    robot.frame(contact.frame)
+    vertices = _foot_vertices(robot, contact, geometry)
+    bottom = vertices[vertices[:, 2] <= vertices[:, 2].min() + THICKNESS]
+    upright = _upright(vertices, Polygon.hull(bottom[:, :2], f"the sole of {contact.name!r}"))
+    if upright == _UP:
+        return contact
+    turn = np.asarray(pin.Quaternion.FromTwoVectors(np.array(_UP), np.array(upright)).matrix())
+    return replace(contact, rotation=contact.rotation @ turn)
 
 
 def tilt_text(contact: Contact, tilt: float) -> str:
@@ -104,38 +145,46 @@ def tilt_text(contact: Contact, tilt: float) -> str:
     )
 
 
-def _tilt(vertices: Float[np.ndarray, "k 3"], outline: Polygon) -> float:
-    """Angle [rad] by which the underside of a foot is turned from the contact's x, y plane.
+def _upright(vertices: Float[np.ndarray, "k 3"], outline: Polygon) -> tuple[float, float, float]:
+    """Unit normal of a foot's underside, away from the ground, contact axes.
 
-    The underside is the largest face of the convex hull that faces down within `_STEEPEST`. Zero
-    where the lowest millimetre holds about half of it: then it is the sole.
+    The underside is the largest face of the convex hull that faces down within `_STEEPEST`. The
+    contact's z where the lowest millimetre holds about half of it: then it is the sole.
     """
     width, depth = np.ptp(vertices[:, :2], axis=0)
     if outline.area > width * depth / 2:
-        return 0.0
+        return _UP
     from scipy.spatial import ConvexHull, QhullError  # slow to import
 
     points = np.unique(np.round(vertices, 9), axis=0)
     if len(points) == 2:  # the two ends of a capsule
         run = points[1] - points[0]
-        slope = float(np.arctan2(abs(run[2]), np.hypot(run[0], run[1])))
-        return slope if len(outline) < 2 and slope <= _STEEPEST else 0.0
+        level = float(np.hypot(run[0], run[1]))
+        if len(outline) < 2 and np.arctan2(abs(run[2]), level) <= _STEEPEST:
+            return _unit(np.array([-run[0] * run[2], -run[1] * run[2], level**2]))
+        return _UP
     try:
         hull = ConvexHull(points)
     except QhullError:
-        return 0.0  # flat: it has no underside of its own
-    areas: dict[tuple[float, ...], float] = {}
+        return _UP  # flat: it has no underside of its own
+    faces: dict[tuple[float, ...], Float[np.ndarray, " 3"]] = {}
     for corners, equation in zip(hull.simplices, hull.equations, strict=True):
-        normal = tuple(np.round(equation[:3], 4).tolist())
-        if -normal[2] >= np.cos(_STEEPEST):
+        alike = tuple(np.round(equation[:3], 4).tolist())
+        if -alike[2] >= np.cos(_STEEPEST):
             a, b, c = points[corners]
-            areas[normal] = areas.get(normal, 0.0) + float(np.linalg.norm(np.cross(b - a, c - a)))
-    if not areas:
-        return 0.0
-    face = max(areas, key=lambda normal: areas[normal])
-    if outline.area >= areas[face] / 4:  # twice the area stands there
-        return 0.0
-    return float(np.arccos(min(1.0, -face[2] / float(np.linalg.norm(face)))))
+            twice = float(np.linalg.norm(np.cross(b - a, c - a)))
+            faces[alike] = faces.get(alike, np.zeros(3)) - twice * equation[:3]
+    if not faces:
+        return _UP
+    largest = max(faces.values(), key=lambda face: float(face @ face))
+    if outline.area >= float(np.linalg.norm(largest)) / 4:  # twice the area stands there
+        return _UP
+    return _unit(largest)
+
+
+def _unit(vector: Float[np.ndarray, " 3"]) -> tuple[float, float, float]:
+    x, y, z = (vector / np.linalg.norm(vector)).tolist()
+    return x, y, z
 
 
 # Meshes are slow to read, and asked for again by notes and warnings. Held as long as the robot, so

@@ -107,3 +107,16 @@ def test_infeasible_limits_are_rows_with_the_limits_in_conflict():
     answer = copsense("sweep", "icub", "--com-y", "-0.02:0.02:3", "--limits", "normal-force=200")
     assert answer.code == 1
     assert "In conflict: l_sole: normal force" in answer.err
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_the_com_is_swept_forwards_and_upwards_too(axis, tmp_path):
+    start = {"x": "-10mm:20mm:2", "z": "0.5:0.51:2"}[axis]
+    file = tmp_path / "swept.nc"
+    arguments = ("sweep", "icub", f"--com-{axis}", start, "--output", file, "--json")
+    assert copsense(*arguments).json["coordinate"] == f"com_{axis}"
+    with xr.open_dataset(file) as data:
+        wanted = {"x": [-0.01, 0.02], "z": [0.5, 0.51]}[axis]
+        np.testing.assert_allclose(data["com"].sel(com_axis=axis), wanted, rtol=0, atol=1e-12)
+    both = copsense("sweep", "icub", "--com-x", "0:1:2", "--com-z", "0:1:2")
+    assert "--com-x, --com-y or --com-z" in both.error

@@ -7,7 +7,15 @@ import pandas as pd
 import pytest
 from support.commands import copsense
 
-from copsense.comparison import load_benchmark, read_plan
+from copsense.comparison import (
+    ControllerChoice,
+    PostureChoice,
+    Rest,
+    RobotChoice,
+    load_benchmark,
+    make_plan,
+    read_plan,
+)
 from copsense.comparison.trials import Breaking, Falls
 from copsense.plots import plot_benchmark, render_figure
 
@@ -104,6 +112,32 @@ def test_a_table_is_printed_written_drawn_and_resumed(plan, tmp_path):
     assert found["scores"][0]["contact"] == "r_sole"
     assert found["agreement"][0]["cases"] == 1
     assert "use the same criterion" in found["caveat"]
+
+
+def test_a_stance_file_is_benchmarked_with_its_limits_and_criteria(tmp_path):
+    stance, table = tmp_path / "leaning.toml", tmp_path / "table.csv"
+    copsense("analyse", "icub", "--com-y", "0.01", "--limits", "friction=0.5", "--criterion",
+             "minimum-wrench", "--characteristic-length", "0.2",
+             "--save-stance", stance)  # fmt: skip
+    arguments = ("benchmark", "--stance", stance, "--disturbance", "rest", "--jobs", 1)
+    answer = copsense(*arguments, "--output", table)
+    assert answer.code == 0, answer.err
+    found = load_benchmark(table)
+    assert set(found["controller"]) == {"minimum-wrench within limits"}
+    assert '"friction": 0.5' in found["parameters"][0]
+    choice = RobotChoice(str(stance))
+    np.testing.assert_allclose(choice.stance(PostureChoice()).com[1], 0.01, rtol=0, atol=1e-9)
+    # A stance file that was changed is another case.
+    before = make_plan([choice], [PostureChoice()], [ControllerChoice()], [Rest()])[0].key
+    stance.write_text(stance.read_text("utf-8") + "\n# changed\n", encoding="utf-8")
+    assert make_plan([choice], [PostureChoice()], [ControllerChoice()], [Rest()])[0].key != before
+    for more, said in (
+        (("icub",), "Give one of them"),
+        (("--posture", "width=0.2"), "--posture own"),
+        (("--contact", "l_sole"), "which contacts"),
+        (("--plan", "plan.toml"), "leave --stance out"),
+    ):
+        assert said in copsense("benchmark", "--stance", stance, *more).error
 
 
 def test_a_failed_run_makes_the_exit_code_one(tmp_path):

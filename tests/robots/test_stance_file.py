@@ -239,3 +239,11 @@ def test_drives_that_were_taken_off_a_file_stay_off(tmp_path):
     again = copsense.load_stance(tmp_path / "stance.toml")
     assert not again.robot.drives
     assert again.robot.torque_names == stance.robot.torque_names
+
+
+def test_a_configuration_and_how_to_stand_up_contradict_each_other(icub, tmp_path):
+    path = tmp_path / "stance.toml"
+    save_stance(icub, path)
+    path.write_text("width_m = 0.2\n" + path.read_text("utf-8"), encoding="utf-8")
+    with pytest.raises(InvalidInputError, match=r"width_m says how to stand up.*Leave one out"):
+        copsense.load_stance(path)

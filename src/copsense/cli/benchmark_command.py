@@ -15,12 +15,13 @@ import click
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
+from copsense.cli.stance_memory import remember_stance, remembered_stance
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError
 from copsense.extras import require
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import pandas as pd
 
@@ -34,10 +35,20 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     "  copsense benchmark --output table.csv --plot table.png\n"
     "  copsense benchmark icub talos --posture own --disturbance lean --jobs 2\n"
     "  copsense benchmark icub --limits friction=0.8,cop-margin=0.001 --disturbance falls\n"
+    "  copsense benchmark --stance carrying.toml --disturbance push\n"
     "  copsense benchmark --plan plan.toml --output table.csv"
 )
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--plan", "plan_file", type=click.Path(), help="Take the cases from a TOML file.")
+@click.option(
+    "--stance",
+    "stance_file",
+    metavar="FILE",
+    is_eager=True,
+    callback=remember_stance,
+    help="A stance file (.toml) instead of ROBOTs; with its limits and criteria, unless options "
+    "give others.",
+)
 @criterion_options
 @click.option(
     "--posture",
@@ -86,6 +97,7 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
 def benchmark(
     robots: tuple[str, ...],
     plan_file: str | None,
+    stance_file: str | None,
     output: str | None,
     picture: str | None,
     jobs: int | None,
@@ -110,9 +122,14 @@ def benchmark(
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=redraw)
     if plan_file is None:
-        plan = _plan(robots or ("icub",), **options)
+        if stance_file is not None and robots:
+            raise InvalidInputError(
+                f"--stance {stance_file} says which robot stands where, and so does "
+                f"{', '.join(robots)}. Give one of them."
+            )
+        plan = _plan(robots or (stance_file or "icub",), **options)
     else:
-        _check_alone(robots, options)
+        _check_alone(robots, options | {"stance_file": stance_file})
         plan = read_plan(plan_file)
     check_plan(plan)
     notes = _check_robots(plan)
@@ -184,15 +201,21 @@ def _plan(
     from copsense.comparison import ControllerChoice, PostureChoice, RobotChoice, make_plan
 
     within = read_limits(limits)
+    file = remembered_stance()
+    chosen_criteria: list[str | Mapping[str, Any]] = list(dict.fromkeys(criteria))
+    if not criteria and file is not None:
+        chosen_criteria = [criterion.to_dict() for criterion in file.criteria]
     controllers: list[ControllerChoice] = [
-        ControllerChoice(name, characteristic_length, gains, within)
-        for name in dict.fromkeys(criteria or ("minimum-wrench", "minimum-torque"))
+        ControllerChoice(criterion, characteristic_length, gains, within)
+        for criterion in chosen_criteria or ("minimum-wrench", "minimum-torque")
     ]
     trials = _trials(disturbances or ("lean", "push", "sway"), repeats, seed, quick)
     cases: list[Case] = []
     for source in dict.fromkeys(robots):
         robot = RobotChoice(source, contacts=contacts)
         chosen = [_posture(text) for text in dict.fromkeys(postures)]
+        if not chosen and robot.is_stance:
+            chosen = [PostureChoice()]
         if not chosen:
             usual = ("straight",) if quick else ("straight", "knees=0.6rad")
             chosen = [_posture(text) for text in usual]
@@ -201,6 +224,7 @@ def _plan(
             except KeyError:  # its knees are not known
                 chosen = [PostureChoice()]
         for posture in chosen:
+            robot.check_own(posture)
             posture.angles(source)
         cases += make_plan([robot], chosen, controllers, trials)
     return tuple(cases)
@@ -212,12 +236,15 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     Returns:
         The robots' notes, which are printed.
     """
-    from copsense.robots import PRESETS, load_robot
+    from copsense.robots import PRESETS, load_robot, load_stance
 
     asked = ((c.robot.source, (*c.robot.contacts, *(c.robot.soles or ()))) for c in plan)
     notes: list[str] = []
     for source, frames in dict.fromkeys(asked):
-        if source not in PRESETS or frames:
+        if source.endswith(".toml"):
+            stance = load_stance(source)
+            notes += [f"{stance.robot.name}: {note}" for note in stance.robot.notes]
+        elif source not in PRESETS or frames:
             robot = load_robot(source, frames=frames)
             for frame in frames:
                 robot.frame(frame)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.units import read_quantity
+from copsense.cli.units import read_quantity, split_assignment
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def put_loads(stance: Stance, loads: tuple[str, ...], payloads: tuple[str, ...])
     A payload moves the CoM, so the robot shifts until it is where it was, over the same point.
     """
     for text in payloads:
-        frame, mass = _assigned(text, _PAYLOAD)
+        frame, mass = split_assignment(text, _PAYLOAD)
         try:
             kilograms = read_quantity(mass, "kg")
         except ValueError:
@@ -77,7 +77,7 @@ def read_point(text: str, option: str) -> tuple[float, float, float]:
 def _read_load(text: str) -> Load:
     from copsense.loads import Load
 
-    frame, numbers = _assigned(text, _LOAD)
+    frame, numbers = split_assignment(text, _LOAD)
     try:
         parts = numbers.split(":")
         values = [read_quantity(part, "N" if i < 3 else "Nm") for i, part in enumerate(parts)]
@@ -88,11 +88,3 @@ def _read_load(text: str) -> Load:
     x, y, z, *moment = values
     mx, my, mz = moment or (0.0, 0.0, 0.0)
     return Load(frame, (x, y, z), (mx, my, mz))
-
-
-def _assigned(text: str, form: str) -> tuple[str, str]:
-    """A frame, whose name may hold colons, and what is given for it."""
-    frame, equals, value = text.rpartition("=")
-    if not (frame and equals and value):
-        raise InvalidInputError(f"{text!r} is not understood. Give {form}.")
-    return frame, value

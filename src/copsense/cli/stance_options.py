@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.cli.contact_options import contact_options, possible_frames, read_contacts
 from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
@@ -15,10 +14,9 @@ from copsense.cli.option_lists import F, with_options
 from copsense.cli.printing import echo_notes
 from copsense.cli.stance_memory import remember_stance, remembered_stance, written
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
-from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from copsense.contact import Contact
     from copsense.stance import Stance
 
 
@@ -43,40 +41,7 @@ def stance_options(command: F) -> F:
             "copsense.load_stance.",
         ),
         click.option("--force-stance", is_flag=True, help="Overwrite that file."),
-        click.option(
-            "--contact",
-            "contacts",
-            multiple=True,
-            metavar="FRAME[:KIND]",
-            help="Contact frame; KIND is surface (default), point or planar. Repeatable; a "
-            "preset has its own.",
-        ),
-        click.option(
-            "--contact-at",
-            type=click.Choice(["frame", "sole"]),
-            help="Put surface contacts at the model's frame, or at the sole's bottom as the "
-            "collision geometry shows it.",
-        ),
-        click.option(
-            "--soles",
-            type=click.Choice(["collision", "visual"]),
-            default="collision",
-            help="Geometry that soles are read from: what collides (default), or what is drawn, "
-            "for a URDF without collision geometry.",
-        ),
-        click.option(
-            "--sole",
-            metavar="X0:X1:Y0:Y1",
-            help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
-            "the collision geometry's.",
-        ),
-        click.option(
-            "--sole-height",
-            type=LENGTH,
-            metavar="LENGTH",
-            help="Height of the contact plane over the model's frames, along its normal [m]; "
-            "negative where the sole lies below the frame, such as -0.1077.",
-        ),
+        contact_options,
         click.option(
             "--package-dir",
             "package_dirs",
@@ -119,8 +84,13 @@ def read_stance(
     contacts: tuple[str, ...],
     contact_at: Any,
     soles: Any,
+    level_soles: bool,
     sole: str | None,
     sole_height: float | None,
+    offsets: tuple[str, ...],
+    turns: tuple[str, ...],
+    grounds: tuple[str, ...],
+    planes: tuple[str, ...],
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
@@ -142,9 +112,10 @@ def read_stance(
 
     file = remembered_stance()
     if file is not None:
-        placed = (contacts, contact_at, sole, sole_height, package_dirs, posture, base_yaw, width)
+        touching = (contacts, contact_at, level_soles, sole, sole_height, offsets, turns, grounds)
+        placed = (*touching, planes, package_dirs, posture, base_yaw, base_rpy, width)
         if robot is not None or any(
-            value not in (None, ()) for value in (*placed, base_rpy, *drives.values())
+            value not in (None, (), False) for value in (*placed, *drives.values())
         ):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
@@ -169,7 +140,7 @@ def read_stance(
     source = (
         robot
         if robot in PRESETS
-        else load_robot(robot, package_dirs=package_dirs, frames=_possible_frames(contacts))
+        else load_robot(robot, package_dirs=package_dirs, frames=possible_frames(contacts))
     )
     if isinstance(source, Robot):
         echo_notes(source.notes)  # at once: what is not used may be why it does not stand
@@ -180,9 +151,20 @@ def read_stance(
     frames = model.frame_names if model is not None else ()
     stance = load_stance(
         source,
-        contacts=_read_contacts(robot, contacts, frames, sole, sole_height),
+        contacts=read_contacts(
+            robot,
+            contacts,
+            frames,
+            sole=sole,
+            sole_height=sole_height,
+            offsets=offsets,
+            turns=turns,
+            grounds=grounds,
+            planes=planes,
+        ),
         contact_at=contact_at,
         soles=soles,
+        level_soles=level_soles,
         package_dirs=package_dirs,
         posture=positions,
         base_rpy=_read_rpy(base_yaw, base_rpy),
@@ -193,65 +175,6 @@ def read_stance(
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
     )
-
-
-def _read_contacts(
-    robot: str,
-    texts: tuple[str, ...],
-    frames: Collection[str],
-    sole: str | None,
-    sole_height: float | None,
-) -> list[str | Contact] | None:
-    """``FRAME[:KIND]`` options as contacts; a frame alone takes what its preset knows of it."""
-    from dataclasses import replace
-
-    from copsense.contact import Contact, rectangle
-    from copsense.robots import PRESETS
-
-    known = PRESETS[robot].contacts if robot in PRESETS else ()
-    contacts: list[Contact] = [] if texts else list(known)
-    for text in texts:
-        frame, kind = _frame_and_kind(text, frames)
-        own = next((c for c in known if c.frame == frame), Contact(frame))
-        contacts.append(own if kind is None else replace(own, kind=kind))  # type: ignore[arg-type]
-    described = sole is not None or sole_height is not None
-    if described and contacts and all(c.kind == "point" for c in contacts):
-        raise InvalidInputError(
-            "--sole and --sole-height describe a sole, and every contact is a point. Leave them "
-            "out, or give a surface contact: --contact FRAME:surface."
-        )
-    if sole is not None:
-        polygon = rectangle(*_read_rectangle(sole))
-        contacts = [replace(c, polygon=polygon) if c.kind != "point" else c for c in contacts]
-    if sole_height is not None:
-        if not math.isfinite(sole_height):
-            raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
-        contacts = [c.at_height(sole_height) if c.kind != "point" else c for c in contacts]
-    return list(contacts) or None
-
-
-def _possible_frames(texts: tuple[str, ...]) -> list[str]:
-    """Frames that ``FRAME[:KIND]`` options may mean, before it is known which there are."""
-    return [frame for text in texts for frame in (text, text.rpartition(":")[0]) if frame]
-
-
-def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None]:
-    """``FRAME[:KIND]`` taken apart: names may hold colons themselves, as in ``robot::l_foot``.
-
-    Args:
-        text: the option.
-        frames: the robot's frames, of which the longest that fits is meant.
-    """
-    from copsense.contact import COMPONENTS
-
-    frame, colon, kind = text.rpartition(":")
-    if not colon or text in frames:
-        return text, None
-    if kind in COMPONENTS:
-        return frame, kind
-    if frame in frames:
-        raise UnknownNameError("kind of contact", kind, COMPONENTS)
-    return text, None  # the look-up of the frame reports what there is
 
 
 def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:
@@ -268,20 +191,3 @@ def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float]
             "90:0:0."
         ) from None
     return roll, pitch, yaw
-
-
-def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:
-    try:
-        x0, x1, y0, y1 = (read_quantity(number, "m") for number in text.split(":"))
-    except ValueError:
-        raise InvalidInputError(
-            f"the sole {text!r} is not understood. Give X0:X1:Y0:Y1 [m], such as "
-            "-0.07:0.12:-0.045:0.05."
-        ) from None
-    finite = all(map(math.isfinite, (x0, x1, y0, y1)))
-    if not (finite and x0 <= x1 and y0 <= y1 and (x0 < x1 or y0 < y1)):
-        raise InvalidInputError(
-            f"the sole {text!r} is empty or not finite. Give X0 < X1 and Y0 < Y1 [m]; one pair may "
-            "be equal, for a sole that is a line."
-        )
-    return (x0, x1), (y0, y1)

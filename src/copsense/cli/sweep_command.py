@@ -31,9 +31,19 @@ if TYPE_CHECKING:
 @stance_options
 @criterion_options
 @click.option(
+    "--com-x",
+    metavar="START:STOP:COUNT",
+    help="Sweep the CoM forwards, world x [m]; CoM y held over the contacts' middle.",
+)
+@click.option(
     "--com-y",
     metavar="START:STOP:COUNT",
     help="Sweep the CoM sideways, world y [m]; CoM x held over the contacts' middle.",
+)
+@click.option(
+    "--com-z",
+    metavar="START:STOP:COUNT",
+    help="Sweep the CoM's height, world z [m]; CoM x and y held over the contacts' middle.",
 )
 @click.option(
     "--joint",
@@ -58,7 +68,9 @@ def sweep(
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,
+    com_x: str | None,
     com_y: str | None,
+    com_z: str | None,
     joint: str | None,
     configurations: str | None,
     output: str | None,
@@ -74,16 +86,17 @@ def sweep(
     from copsense.files import check_output
     from copsense.sweeps import sweep as evaluate
 
-    if sum(what is not None for what in (com_y, joint, configurations)) != 1:
+    com = {"com_x": com_x, "com_y": com_y, "com_z": com_z}
+    if sum(what is not None for what in (*com.values(), joint, configurations)) != 1:
         raise InvalidInputError(
-            "say what to sweep, one of: --com-y START:STOP:COUNT [m], "
+            "say what to sweep, one of: --com-x, --com-y or --com-z START:STOP:COUNT [m], "
             "--joint NAME=START:STOP:COUNT, --configurations FILE."
         )
     if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
-    path = _read_path(read_stance(robot, **options), com_y, joint, configurations)
+    path = _read_path(read_stance(robot, **options), com, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
         swept = evaluate(path, chosen, within, progress=update)
     swept = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
@@ -105,19 +118,20 @@ def sweep(
 
 
 def _read_path(
-    stance: Stance, com_y: str | None, joint: str | None, configurations: str | None
+    stance: Stance, com: dict[str, str | None], joint: str | None, configurations: str | None
 ) -> PosturePath:
     """The path that the options ask for."""
     from copsense.files import load_configurations
-    from copsense.path import joint_sweep, lateral_sweep, path_through
+    from copsense.path import com_sweep, joint_sweep, path_through
 
     if configurations is not None:
         rows = load_configurations(configurations)
         return path_through(stance.at(rows[0]), rows, strict=False)
-    if com_y is not None:
-        start, stop, count = read_range(com_y, "m")
-        with progress_bar(max(count, 0), "postures") as update:
-            return lateral_sweep(stance, start, stop, count, progress=update)
+    for coordinate, text in com.items():
+        if text is not None:
+            start, stop, count = read_range(text, "m")
+            with progress_bar(max(count, 0), "postures") as update:
+                return com_sweep(stance, coordinate, start, stop, count, progress=update)
     name, _, text = str(joint).partition("=")
     start, stop, count = read_range(text, stance.robot.joint_unit(name))
     with progress_bar(max(count, 0), "postures") as update:

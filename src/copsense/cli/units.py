@@ -146,6 +146,22 @@ def read_assignments(texts: Iterable[str], form: str, unit: Unit | None = None) 
     return values
 
 
+def split_assignment(text: str, form: str) -> tuple[str, str]:
+    """``NAME=VALUE`` taken apart at the last equals sign: a frame's name may hold others.
+
+    Args:
+        text: the option.
+        form: how to write one, for the error message.
+
+    Raises:
+        InvalidInputError: not an assignment.
+    """
+    name, equals, value = text.rpartition("=")
+    if not (name and equals and value):
+        raise InvalidInputError(f"{text!r} is not understood. Give {form}.")
+    return name, value
+
+
 def _pairs(texts: Iterable[str], form: str) -> Iterator[tuple[str, str]]:
     for text in texts:
         name, equals, value = text.partition("=")

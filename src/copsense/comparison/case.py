@@ -8,7 +8,6 @@ from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from copsense.comparison.choices import Conditions, ControllerChoice, PostureChoice, RobotChoice
@@ -16,7 +15,6 @@ from copsense.comparison.trials import Falls, Trial
 from copsense.controllers import controller_code
 from copsense.errors import InvalidInputError
 from copsense.provenance import digest, plain, versions
-from copsense.robots import PRESETS
 
 IDEAL = Conditions()
 
@@ -71,8 +69,8 @@ class Case:
     def _parameters(self) -> dict[str, Any]:
         parts = ("robot", "posture", "controller", "trial", "conditions")
         found = {name: plain(getattr(self, name)) for name in parts}
-        if self.robot.source not in PRESETS and Path(self.robot.source).is_file():
-            content = Path(self.robot.source).read_bytes()
+        if files := self.robot.files:
+            content = b"".join(file.read_bytes() for file in files)
             found["robot"]["content"] = hashlib.sha256(content).hexdigest()[:12]
         if self.controller.source:
             content = controller_code(self.controller.source)

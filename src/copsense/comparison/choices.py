@@ -15,7 +15,7 @@ from copsense.criterion import Criterion, criterion_named
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.robot import Robot
-from copsense.robots import PRESETS, load_robot, load_stance
+from copsense.robots import PRESETS, StanceFile, load_robot, load_stance
 from copsense.simulation import Scenario
 from copsense.stance import Stance
 
@@ -50,7 +50,8 @@ class RobotChoice:
     """A robot and its soles.
 
     Attributes:
-        source: a preset's name, or the path of a URDF or MJCF.
+        source: a preset's name, or the path of a URDF or MJCF; or of a stance file (.toml), which
+            says all the rest, and how the robot stands.
         name: in results; default the source.
         contacts: frames of the contacts; default the preset's.
         soles: frame -> rectangle (x0, x1, y0, y1) in the contact frame [m], instead of the sole
@@ -70,6 +71,11 @@ class RobotChoice:
         object.__setattr__(self, "name", self.name or Path(self.source).stem)
         object.__setattr__(self, "contacts", tuple(self.contacts))
         freeze(self, "soles")
+        if self.is_stance and (self.contacts or self.soles or self.sole_height):
+            raise InvalidInputError(
+                f"the stance file {self.source} says which contacts robot {self.name!r} has, and "
+                "so does another field. Leave contacts, soles and sole_height (--contact) out."
+            )
         finite_number(self.sole_height, f"the sole height of robot {self.name!r} [m]")
         for frame, sole in (self.soles or {}).items():
             numbers = [finite_number(x, f"the sole of {frame} [m]") for x in sole]
@@ -78,12 +84,41 @@ class RobotChoice:
                     f"the sole of {frame} is {sole!r}. Give four numbers [m], x0 < x1 and y0 < y1."
                 )
 
+    @property
+    def is_stance(self) -> bool:
+        """Whether the source is a stance file."""
+        return self.source.endswith(".toml")
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that say what the robot is."""
+        if self.source in PRESETS or not Path(self.source).is_file():
+            return ()
+        own = Path(self.source)
+        model = StanceFile.read(own).source if self.is_stance else ""
+        return (own, model) if isinstance(model, Path) and model.is_file() else (own,)
+
+    def check_own(self, posture: PostureChoice) -> None:
+        """Reject a posture beside the stance file's own.
+
+        Raises:
+            InvalidInputError: it bends knees, moves joints or sets a width.
+        """
+        if self.is_stance and posture.changes:
+            raise InvalidInputError(
+                f"the stance file {self.source} says how the robot stands, and so does posture "
+                f"{posture.name!r}. Use the posture own (--posture own)."
+            )
+
     def stance(self, posture: PostureChoice) -> Stance:
         """The robot standing in a posture.
 
         Raises:
             CopsenseError: the robot cannot be loaded, or cannot stand in this posture.
         """
+        if self.is_stance:
+            self.check_own(posture)
+            return load_stance(self.source)
         robot: str | Robot = self.source
         if self.source not in PRESETS:
             robot = load_robot(self.source, frames=(*self.contacts, *(self.soles or ())))
@@ -125,6 +160,11 @@ class PostureChoice:
         if self.width is not None:
             finite_number(self.width, f"the width of posture {self.name!r} [m]", positive=True)
 
+    @property
+    def changes(self) -> bool:
+        """Whether it says anything that the robot's own posture does not."""
+        return (self.knees, self.width) != (None, None) or bool(self.joints)
+
     def angles(self, robot: str) -> dict[str, float]:
         """Joint -> position [rad, m] for a robot.
 
@@ -146,7 +186,8 @@ class ControllerChoice:
     """A balancing controller.
 
     Attributes:
-        criterion: the name of the criterion that shares the load.
+        criterion: the criterion that shares the load: its name, or a table as
+            `Criterion.to_dict` writes it.
         characteristic_length: L of minimum-wrench [m].
         gains: ``"stiff"`` or ``"public"``.
         limits: what the contact wrenches and torques must respect, or None.
@@ -155,7 +196,7 @@ class ControllerChoice:
             controller; the prediction then assumes `criterion` and `limits`.
     """
 
-    criterion: str = "minimum-torque"
+    criterion: str | Mapping[str, Any] = "minimum-torque"
     characteristic_length: float = 1.0
     gains: str = "stiff"
     limits: Limits | None = None
@@ -164,7 +205,9 @@ class ControllerChoice:
 
     def __post_init__(self) -> None:
         """Set the default name and validate the others."""
-        criterion_named(self.criterion, self.characteristic_length)
+        if not isinstance(self.criterion, str):
+            freeze(self, "criterion")
+        own = self.build_criterion().name
         if self.gains not in _GAINS:
             raise UnknownNameError("set of gains", self.gains, _GAINS)
         if self.source and not all(self.source.rpartition(":")):
@@ -172,7 +215,7 @@ class ControllerChoice:
                 f"the controller {self.source!r} is not understood. Give MODULE:ATTRIBUTE, a "
                 "callable stance -> controller."
             )
-        usual = (self.source or self.criterion) + (" within limits" if self.limited else "")
+        usual = (self.source or own) + (" within limits" if self.limited else "")
         object.__setattr__(self, "name", self.name or usual)
 
     @property
@@ -181,7 +224,9 @@ class ControllerChoice:
         return self.limits is not None and self.limits.any
 
     def build_criterion(self) -> Criterion:
-        """The criterion with that name."""
+        """The criterion with that name, or of that table."""
+        if not isinstance(self.criterion, str):
+            return Criterion.from_dict(self.criterion)
         return criterion_named(self.criterion, self.characteristic_length)
 
     def gains_of(self, robot: Robot) -> Gains:

@@ -32,7 +32,8 @@ def abscissa(result: LabelledResult, name: str | None = None) -> Abscissa:
     name = name or str(result.attrs["coordinate"])
     variable = result[name]
     values = np.asarray(variable.values, dtype=float)
-    title = {"com_y": "CoM y", "com_x": "CoM x", "index": "posture"}.get(name, name)
+    titles = {"com_x": "CoM x", "com_y": "CoM y", "com_z": "CoM z", "index": "posture"}
+    title = titles.get(name, name)
     unit = str(variable.attrs.get("units", "1"))
     if unit == "m":
         return Abscissa(values * MM, f"{title} [mm]")

@@ -13,11 +13,12 @@ from copsense.errors import CopsenseError, ModelLoadError
 from copsense.robot import Robot
 from copsense.robots.presets import Preset
 from copsense.shapes import Geometry
-from copsense.sole import Sole, read_sole, tilt_text
+from copsense.sole import LEVEL, Sole, levelled, read_sole, tilt_text
 from copsense.stance import Stance
 
 ContactAt = Literal["frame", "sole"]
 _AT_FRAME = 0.05  # mm: a sole nearer to its frame is at it
+_LEANING = 45.0  # deg: a frame turned by less was levelled, by more has another axis up
 _OFF_SOLE = 1e-3  # m: a contact frame farther from the sole's bottom is said to be off it
 
 
@@ -31,10 +32,13 @@ def complete_contacts(
     preset: Preset | None,
     at: ContactAt | None,
     geometry: Geometry = "collision",
+    *,
+    level: bool = False,
 ) -> tuple[Contact, ...]:
     """Fill in offsets and polygons from the geometry.
 
-    A contact that the caller placed stays there, unless the sole is asked for.
+    A contact that the caller placed stays there, unless the sole is asked for. With `level` every
+    surface contact is first turned until its sole lies flat.
     """
     mode = preset.sole_from_geometry if preset else None
     known = {c.frame: c for c in preset.contacts} if preset else {}
@@ -48,6 +52,8 @@ def complete_contacts(
         outline = contact.polygon is None and (
             at is not None or mode is not None or (not preset and robot.description is not None)
         )
+        if level and contact.kind == "surface":
+            contact = levelled(robot, contact, geometry=geometry)
         if contact.kind != "surface" or not (lower or outline):
             completed.append(contact)
             continue
@@ -68,8 +74,8 @@ def complete_contacts(
         if sole.tilt and contact.polygon is None:
             warnings.warn(
                 f"contact {contact.name!r} was given the lowest edge alone as its sole, because "
-                f"{tilt_text(contact, sole.tilt)}. Turn the contact by its rotation so that the "
-                "underside lies flat, or give the polygon.",
+                f"{tilt_text(contact, sole.tilt)}. {LEVEL[0].upper()}{LEVEL[1:]}, or give the "
+                "polygon.",
                 ContactGeometryWarning,
                 stacklevel=3,
             )
@@ -129,8 +135,10 @@ def soles_read(stance: Stance) -> tuple[str, ...]:
             except CopsenseError:
                 continue
             if np.array_equal(contact.polygon, sole.polygon):
+                turn = float(np.degrees(np.arccos(min(1.0, contact.normal[2]))))
+                turned = f"; turned by {turn:.1f} deg to lie flat" if 0 < turn < _LEANING else ""
                 found.append(
-                    f"{contact.name}: sole {sole_text(contact, sole)}; read from its "
+                    f"{contact.name}: sole {sole_text(contact, sole)}{turned}; read from its "
                     f"{geometry} geometry."
                 )
                 break

@@ -41,6 +41,7 @@ from copsense.robots.stance_tables import (
     read_payload,
     read_posture,
     table_of,
+    truth,
 )
 from copsense.stance import Stance, check_at_rest
 
@@ -48,16 +49,22 @@ if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.limits import Limits
 
-_KEYS = (
-    "robot",
-    "package_dirs",
-    "locked",
+# How to stand up, where no configuration says it.
+_STANDING = (
     "contact_at",
+    "soles",
+    "level_soles",
     "width_m",
     "base_rpy_deg",
     "posture_deg",
     "posture_rad",
     "posture_m",
+)
+_KEYS = (
+    "robot",
+    "package_dirs",
+    "locked",
+    *_STANDING,
     "configuration",
     "contacts",
     "loads",
@@ -169,6 +176,12 @@ class StanceFile:
         payloads = [read_payload(each) for each in list_of(data.get("payloads", []), "payloads")]
         loads = read_loads(data)
         if "configuration" in data:
+            beside = [key for key in _STANDING if key in data]
+            if beside:
+                raise InvalidInputError(
+                    f"{', '.join(beside)} {'says' if len(beside) == 1 else 'say'} how to stand up, "
+                    "and the [configuration] where every joint is. Leave one out."
+                )
             for payload in payloads:
                 robot = robot.with_payload(**payload)
             q = read_configuration(robot, table_of(data["configuration"], "configuration"))
@@ -182,6 +195,8 @@ class StanceFile:
             base_rpy=None if rpy is None else np.radians(finite_array(rpy, "base_rpy_deg", (3,))),
             width=None if "width_m" not in data else finite_number(data["width_m"], "width_m"),
             contact_at=data.get("contact_at"),
+            soles=data.get("soles", "collision"),
+            level_soles=truth(data.get("level_soles", False), "level_soles"),
             package_dirs=folders,
         )
         for payload in payloads:

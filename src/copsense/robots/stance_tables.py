@@ -271,6 +271,13 @@ def list_of(value: object, what: str) -> list[Any]:
     return value
 
 
+def truth(value: object, what: str) -> bool:
+    """A value that is true or false, or an error."""
+    if not isinstance(value, bool):
+        raise InvalidInputError(f"{what} is {value!r}. Write true or false.")
+    return value
+
+
 def _text(data: Mapping[str, Any], key: str, what: str) -> str:
     value = data.get(key)
     if not isinstance(value, str) or not value:

@@ -102,6 +102,7 @@ def load_stance(
     width: float | None = None,
     contact_at: ContactAt | None = None,
     soles: Geometry = "collision",
+    level_soles: bool = False,
     package_dirs: Iterable[str | Path] = (),
     drives: Drives | None = None,
     passive: Iterable[str] = (),
@@ -127,6 +128,8 @@ def load_stance(
             where that is not on the sole.
         soles: which geometry soles are read from: what collides, or what is drawn, for a URDF
             without collision geometry.
+        level_soles: turn surface contacts whose sole is tilted against their frame, until it lies
+            flat.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         drives: what holds the robot's joints, instead of what its file says.
         passive: joints without a motor, beside those that have none already.
@@ -139,8 +142,8 @@ def load_stance(
     if soles not in get_args(Geometry):
         raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
-        given = (contacts, posture, base_rpy, width, contact_at, drives, passive or None)
-        if any(value is not None for value in given):
+        given = (contacts, posture, base_rpy, width, contact_at, drives)
+        if level_soles or passive or any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
                 "argument. Change the file, or leave the argument out."
@@ -186,7 +189,8 @@ def load_stance(
         rpy = np.array(preset.base_rpy if preset else base_turn(robot, chosen, q))
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
     check_size(Stance(robot, q, chosen, check=False))
-    chosen = complete_contacts(robot, upright_contacts(robot, chosen, q), preset, contact_at, soles)
+    upright = upright_contacts(robot, chosen, q)
+    chosen = complete_contacts(robot, upright, preset, contact_at, soles, level=level_soles)
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
     return stand(robot, chosen, q, width=width)

@@ -100,8 +100,8 @@ class Kkt:
         right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
         dx = self.system.solve(right)
         if self.system.singular:
-            left = np.abs(self.system.matrix @ dx - right).max()
-            if left > 1e-7 * max(1.0, np.abs(right).max()):
+            left = np.abs(self.system.matrix @ dx - right).max(initial=0.0)
+            if left > 1e-7 * max(1.0, np.abs(right).max(initial=0.0)):
                 raise UndeterminedWrenchError(
                     "the contacts lose rank at this very posture (a straight leg, say): the "
                     "wrenches have no derivative here. Move the posture off the singularity."

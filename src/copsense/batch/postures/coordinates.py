@@ -17,11 +17,11 @@ import pinocchio as pin
 from copsense.arrays import finite_array
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.path import COM_COORDINATES
 from copsense.stance import Stance
 
 Unit = Literal["m", "rad"]
 
-COM = ("com_x", "com_y", "com_z")
 BASE = ("base_x", "base_y", "base_z", "roll", "pitch", "yaw")
 FOOT = ("x", "y", "yaw")
 _WAYS = ("along x", "along y", "along z", "about x", "about y", "about z")
@@ -88,7 +88,7 @@ def coordinate_names(stance: Stance) -> tuple[str, ...]:
         if c.kind != "planar" and normal[2] > _STEEP
     ]
     joints = [n for n in stance.robot.joint_names if _one(stance, n)]
-    return (*COM, *base, *joints, *feet)
+    return (*COM_COORDINATES, *base, *joints, *feet)
 
 
 def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
@@ -119,11 +119,11 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
     nb, nv = stance.robot.base_nv, stance.robot.model.nv
     index = {name: i for i, name in enumerate(BASE)} if nb == 6 else {}
     index |= {n: stance.robot.velocity_index(n) for n in stance.robot.joint_names if n in names}
-    index |= {name: nv + i for i, name in enumerate(COM)}
+    index |= {name: nv + i for i, name in enumerate(COM_COORDINATES)}
     for k, contact in enumerate(stance.contacts):
         index |= {f"{contact.name}:{way}": nv + 3 + 3 * k + i for i, way in enumerate(FOOT)}
     place = np.array([index[name] for name in names], dtype=np.int64)
-    com_axes = tuple(i for i, name in enumerate(COM) if name in names)
+    com_axes = tuple(i for i, name in enumerate(COM_COORDINATES) if name in names)
     limbs = _limbs(stance, {int(p) for p in place}, com_axes)
     unknowns = {u for limb in limbs for u in limb.unknowns}
     low, high = stance.robot.position_limits
