@@ -68,6 +68,18 @@ def horizontals(ax):
 # --- what is drawn ------------------------------------------------------------------------------
 
 
+def test_a_figure_laid_out_once_is_drawn_as_before(lateral):
+    def draw():
+        return plots.plot_results(lateral).get_figure(root=True)
+
+    once, twice = draw(), draw()
+    plots.lay_out(once)
+    assert once.get_layout_engine() is None
+    assert plots.render_figure(once, ".svg") == plots.render_figure(twice, ".svg")
+    twice.set_layout_engine("none")  # as the SVG has laid it out
+    assert plots.render_figure(once, ".png") == plots.render_figure(twice, ".png")
+
+
 def test_the_edges_are_drawn_where_the_soles_end(lateral):
     """A CoP on a line drawn has no margin left; four lines, two a sole."""
     heights = horizontals(plots.plot_cop(lateral))

@@ -18,11 +18,9 @@ def small_reproduction():
 def blank_pictures(monkeypatch):
     """Reports have pictures that cost nothing, for tests that are not about them."""
 
-    def blank():
-        return SimpleNamespace(set_layout_engine=lambda engine: None)
-
     def figures(reproduction):
-        return [replace(figure, draw=blank) for figure in report_figures(reproduction)]
+        return [replace(figure, draw=SimpleNamespace) for figure in report_figures(reproduction)]
 
     monkeypatch.setattr(report_folder, "report_figures", figures)
+    monkeypatch.setattr(report_folder, "lay_out", lambda figure: None)
     monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")

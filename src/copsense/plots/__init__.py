@@ -24,12 +24,13 @@ from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_re
 from copsense.plots.map_plots import plot_map
 from copsense.plots.push_plots import plot_pushes
 from copsense.plots.recording_plots import plot_rollout
-from copsense.plots.saving import render_figure, save_figure
+from copsense.plots.saving import lay_out, render_figure, save_figure
 from copsense.plots.sole_plots import plot_soles
 from copsense.plots.stance_plots import plot_stance
 from copsense.plots.sweep_plots import plot_results
 
 __all__ = [
+    "lay_out",
     "plot_benchmark",
     "plot_cop",
     "plot_design",

@@ -1,4 +1,8 @@
-"""save_figure: a figure as a file, written whole or not at all."""
+"""save_figure: a figure as a file, written whole or not at all.
+
+Matplotlib draws a figure twice to save it: once to lay it out and once into the file. A figure for
+several files is laid out once, by `lay_out`; each file then costs one drawing.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from copsense.files import check_output, write_beside
@@ -18,6 +23,8 @@ _UNDATED: dict[str, dict[str, None]] = {
     ".pdf": {"CreationDate": None},
     ".png": {},
 }
+_VECTOR_DPI = 72.0  # at which Matplotlib lays an SVG out
+_UNCHANGING = {"figure.autolayout": False, "figure.constrained_layout.use": False}
 
 
 def save_figure(
@@ -49,3 +56,24 @@ def render_figure(figure: Figure | Axes, suffix: str, *, dpi: float = 160.0) -> 
     with mpl.rc_context({"svg.hashsalt": "copsense", "svg.fonttype": "path"}):
         whole.savefig(content, format=suffix[1:], dpi=dpi, metadata=_UNDATED[suffix])
     return content.getvalue()
+
+
+def lay_out(figure: Figure) -> None:
+    """Place what a figure holds for good, as in an SVG of it; saving it then costs half the time.
+
+    An SVG has the same bytes as without. A PNG has the same layout, where its own would differ from
+    the SVG's by the rounding of text to pixels.
+    """
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    canvas, dpi = figure.canvas, figure.dpi
+    FigureCanvasSVG(figure)  # becomes the figure's own
+    try:
+        figure.dpi = _VECTOR_DPI
+        engine.execute(figure)
+    finally:
+        figure.dpi = dpi
+        figure.set_canvas(canvas)
+    with mpl.rc_context(_UNCHANGING):  # type: ignore[arg-type]  # None means what these say
+        figure.set_layout_engine(None)

@@ -17,7 +17,7 @@ from copsense.errors import OutputError
 from copsense.paper.report.page import render_page
 from copsense.paper.report.static_figures import report_figures
 from copsense.paper.reproduce import Reproduction
-from copsense.plots import render_figure
+from copsense.plots import lay_out, render_figure
 
 PAGE = "report.html"
 _FOLDERS = ("figures", "data")
@@ -99,10 +99,9 @@ def _write_everything(reproduction: Reproduction, folder: Path, command: str) ->
     figures, pictures = report_figures(reproduction), {}
     for figure in figures:
         drawn = figure.draw()
+        lay_out(drawn)
         pictures[figure.name] = render_figure(drawn, ".svg")
         (folder / "figures" / f"{figure.name}.svg").write_bytes(pictures[figure.name])
-        # Laid out already: a second layout would cost as much as the drawing.
-        drawn.set_layout_engine("none")
         (folder / "figures" / f"{figure.name}.png").write_bytes(render_figure(drawn, ".png"))
     _write_data(reproduction, folder / "data")
     page = render_page(reproduction, pictures, figures, command=command)
