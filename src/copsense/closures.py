@@ -40,8 +40,15 @@ _AXES = "xyz"
 
 
 @dataclass(frozen=True)
-class _Joined:
-    """Two attachments that are kept together, rows of J_l."""
+class Joined:
+    """Two attachments that are kept together, rows of J_l.
+
+    Attributes:
+        a: the first.
+        b: the second.
+        weld: whether they are held fast; otherwise their points stay together.
+        name: what results call it.
+    """
 
     a: Attachment
     b: Attachment
@@ -50,6 +57,7 @@ class _Joined:
 
     @property
     def size(self) -> int:
+        """Number of rows."""
         return 6 if self.weld else 3
 
 
@@ -82,7 +90,7 @@ class Closures(ShortRepr):
     def error(self) -> Float[np.ndarray, " l"]:
         """How far each row is from closed (l,) [m, rad]."""
         places, found = self._ends[0], []
-        for k, pair in enumerate(_joined(self.robot)):
+        for k, pair in enumerate(joined(self.robot)):
             a, b = places[2 * k], places[2 * k + 1]
             if pair.weld:
                 found.append(pin.log6(b.actInv(a)).vector)
@@ -99,7 +107,7 @@ class Closures(ShortRepr):
         """J_l, every row."""
         places, local = self._ends
         nv, found = self.robot.model.nv, []
-        for k, pair in enumerate(_joined(self.robot)):
+        for k, pair in enumerate(joined(self.robot)):
             a, b = local[2 * k], local[2 * k + 1]
             if pair.weld:
                 found.append(a - b)
@@ -159,10 +167,10 @@ class Closures(ShortRepr):
 
     def _pairs(
         self, lam: Float[np.ndarray, " l"]
-    ) -> list[tuple[int, _Joined, Float[np.ndarray, " _"]]]:
+    ) -> list[tuple[int, Joined, Float[np.ndarray, " _"]]]:
         """Number, ends and forces of each pair."""
         found, row = [], 0
-        for k, pair in enumerate(_joined(self.robot)):
+        for k, pair in enumerate(joined(self.robot)):
             found.append((k, pair, lam[row : row + pair.size]))
             row += pair.size
         return found
@@ -173,7 +181,7 @@ class Closures(ShortRepr):
             self.robot, self.q, velocity, _attachments(self.robot)
         )
         (places, local), found = self._ends, []
-        for k, pair in enumerate(_joined(self.robot)):
+        for k, pair in enumerate(joined(self.robot)):
             a, b = moved[2 * k], moved[2 * k + 1]
             if pair.weld:
                 found.append(a - b)
@@ -188,16 +196,16 @@ class Closures(ShortRepr):
 
 
 @lru_cache(maxsize=32)
-def _joined(robot: Robot) -> tuple[_Joined, ...]:
-    """The pairs that a robot's loops keep together."""
-    found: list[_Joined] = []
+def joined(robot: Robot) -> tuple[Joined, ...]:
+    """The pairs that a robot's loops keep together, in the order of the rows; of a pin, two."""
+    found: list[Joined] = []
     for loop in robot.drives.loops:
         for sign in (-0.5, 0.5) if loop.kind == "pin" else (0.0,):
             along = sign * _ARM * np.array(loop.axis) / np.linalg.norm(loop.axis)
             a = _attached(robot, loop, loop.frame_a, np.array(loop.offset_a) + along)
             b = _attached(robot, loop, loop.frame_b, np.array(loop.offset_b) + along)
             name = f"{loop.name} ({'-+'[sign > 0]})" if sign else loop.name
-            found.append(_Joined(a, b, loop.kind == "weld", name))
+            found.append(Joined(a, b, loop.kind == "weld", name))
     return tuple(found)
 
 
@@ -213,12 +221,12 @@ def _attached(robot: Robot, loop: Loop, name: str, point: np.ndarray) -> Attachm
 
 @lru_cache(maxsize=32)
 def _attachments(robot: Robot) -> tuple[Attachment, ...]:
-    return tuple(end for pair in _joined(robot) for end in (pair.a, pair.b))
+    return tuple(end for pair in joined(robot) for end in (pair.a, pair.b))
 
 
 @lru_cache(maxsize=32)
 def _names(robot: Robot) -> tuple[str, ...]:
     six = [f"{kind}{axis}" for kind in "fm" for axis in _AXES]
-    names = [f"{pair.name} {six[i]}" for pair in _joined(robot) for i in range(pair.size)]
+    names = [f"{pair.name} {six[i]}" for pair in joined(robot) for i in range(pair.size)]
     names += [f"coupling of {coupling.joint}" for coupling in robot.drives.couplings]
     return tuple(names)

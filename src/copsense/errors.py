@@ -110,6 +110,32 @@ class UnbalancedError(CopsenseError):
         return type(self), (self.robot, self.lacking)
 
 
+class UnstablePostureError(CopsenseError):
+    """Joints without a motor are at rest at a posture, but would not come back to it.
+
+    Attributes:
+        robot: the robot's name.
+        joints: those that would fall, the one that moves most first.
+        stiffness: u'A u of their motion u, of length one [Nm/rad]; negative where it falls.
+    """
+
+    def __init__(self, robot: str, joints: tuple[str, ...], stiffness: float) -> None:
+        """Compose the message from what would fall."""
+        self.robot = robot
+        self.joints = joints
+        self.stiffness = stiffness
+        super().__init__(
+            f"{robot!r} would fall at this posture: no motor, contact or loop holds "
+            f"{', '.join(joints)}, and gravity and springs do not bring them back (stiffness "
+            f"{stiffness:.3g} Nm/rad). Give the joint a motor or a stiffer spring, or let it hang "
+            "below its axis."
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are built from the data, not from the message."""
+        return type(self), (self.robot, self.joints, self.stiffness)
+
+
 class InsufficientContactsError(CopsenseError):
     """The contacts cannot carry the robot's weight, however the load is shared."""
 

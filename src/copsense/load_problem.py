@@ -13,7 +13,7 @@ what limits allow, `LimitRows.over_forces`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -35,6 +35,9 @@ class LoadProblem(ShortRepr):
         joint_map: contact forces to motor torques (n, m).
         torque_offset: (n,) [Nm].
         joint_inertia: M_j (n, n), for a criterion that weighs with its inverse.
+        response: of a robot in motion whose other accelerations follow that of its base: how the
+            rows of the base and of the motors change per wrench on the base (nb + n, 6); None where
+            they do not.
     """
 
     base_map: Float[np.ndarray, "nb m"]
@@ -42,6 +45,7 @@ class LoadProblem(ShortRepr):
     joint_map: Float[np.ndarray, "n m"]
     torque_offset: Float[np.ndarray, " n"]
     joint_inertia: Float[np.ndarray, "n n"]
+    response: Float[np.ndarray, "r 6"] | None = None
 
     @classmethod
     def of(cls, stance: Stance) -> LoadProblem:
@@ -58,6 +62,26 @@ class LoadProblem(ShortRepr):
     def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
         """The torques that contact forces take (n,) [Nm]."""
         return np.asarray(self.torque_offset - self.joint_map.dot(forces))
+
+    def yielding(self) -> LoadProblem:
+        """The same where the wrench on the base may be another than the wanted one.
+
+        Accelerations follow it. The base's rows are the first six; those that cannot change, for
+        want of motors, are stated again behind them.
+        """
+        if self.response is None:
+            return self
+        nb, B, w = len(self.base_map), self.base_map[:6], self.base_wrench[:6]
+        free, motors = self.response[6:nb], self.response[nb:]
+        stiff = np.eye(6) - self.response[:6]
+        return replace(
+            self,
+            base_map=np.vstack([B, stiff.dot(B), self.base_map[6:] - free.dot(B)]),
+            base_wrench=np.concatenate([w, stiff.dot(w), self.base_wrench[6:] - free.dot(w)]),
+            joint_map=self.joint_map - motors.dot(B),
+            torque_offset=self.torque_offset - motors.dot(w),
+            response=None,
+        )
 
     def imbalance(self, forces: Float[np.ndarray, " m"]) -> float:
         """Largest force or moment on the base by which contact forces miss the load [N, Nm]."""

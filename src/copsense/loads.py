@@ -114,11 +114,7 @@ def apply_loads(
     Raises:
         UnknownNameError: a load's frame is not in the model.
     """
-    attachments = []
-    for load in loads:
-        frame = robot.frame(load.frame)
-        place = frame.placement * pin.SE3(np.eye(3), np.array(load.point))
-        attachments.append(Attachment(int(frame.parentJoint), place))
+    attachments = load_places(loads, robot)
     places, local = rigid_body.place(robot, q, attachments)
     nv = robot.model.nv
     balanced, derivative = np.zeros(nv), np.zeros((nv, nv))
@@ -126,16 +122,10 @@ def apply_loads(
     forces: dict[int, pin.Force] = {}
     for k, (load, here) in enumerate(zip(loads, places, strict=True)):
         R, J = here.rotation, local[k]
+        wrenches[k] = load_wrench(load, here)
         if isinstance(load, SpringLoad):
-            stretch = here.translation - np.array(load.anchor)
-            force = np.array(load.force) - np.array(load.stiffness) * stretch
-            wrenches[k, :3] = force
             across = R @ J[:3]
             derivative += across.T @ (np.array(load.stiffness)[:, None] * across)
-        elif load.fixed_to == "world":
-            wrenches[k] = np.concatenate([load.force, load.moment])
-        else:
-            wrenches[k] = np.concatenate([R @ np.array(load.force), R @ np.array(load.moment)])
         own = np.concatenate([R.T @ wrenches[k, :3], R.T @ wrenches[k, 3:]])
         balanced += J.T @ own
         if isinstance(load, SpringLoad) or load.fixed_to == "world":
@@ -150,6 +140,37 @@ def apply_loads(
         FrozenMapping(forces),
         read_only(derivative),
     )
+
+
+def load_places(loads: Sequence[AnyLoad], robot: Robot) -> list[Attachment]:
+    """Where loads act on a robot.
+
+    Raises:
+        UnknownNameError: a load's frame is not in the model.
+    """
+    found = []
+    for load in loads:
+        frame = robot.frame(load.frame)
+        place = frame.placement * pin.SE3(np.eye(3), np.array(load.point))
+        found.append(Attachment(int(frame.parentJoint), place))
+    return found
+
+
+def load_wrench(load: AnyLoad, place: pin.SE3) -> Float[np.ndarray, " 6"]:
+    """Wrench of a load about the point where it acts, in world axes [N, Nm].
+
+    Args:
+        load: the load.
+        place: of that point and its frame's axes in the world.
+    """
+    if isinstance(load, SpringLoad):
+        stretch = place.translation - np.array(load.anchor)
+        force = np.array(load.force) - np.array(load.stiffness) * stretch
+        return np.concatenate([force, np.zeros(3)])
+    if load.fixed_to == "world":
+        return np.concatenate([load.force, load.moment])
+    R = place.rotation
+    return np.concatenate([R @ np.array(load.force), R @ np.array(load.moment)])
 
 
 def turning(

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense import Contact, Robot, Stance, solve_posture
+from copsense.closing import close
 from copsense.drives import Coupling, Drives, Loop, Spring, Transmission
 
 SOLE = np.array([(-0.06, -0.04), (0.12, -0.04), (0.12, 0.04), (-0.06, 0.04)])
@@ -120,3 +121,45 @@ def everything() -> Robot:
             transmissions=(both,),
         ),
     )
+
+
+def five_bar_model() -> pin.Model:
+    """A quadruped of 14 kg: hips that roll, and legs of two cranks and two rods that meet below."""
+    model = pin.Model()
+    model.name = "five_bars"
+    base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
+    trunk = pin.Inertia.FromBox(9.0, 0.5, 0.25, 0.12)
+    trunk.lever = np.array([0.01, 0.003, 0.02])
+    model.appendBodyToJoint(base, trunk, pin.SE3.Identity())
+    for leg, x, y in (
+        ("fl", 0.2, 0.14),
+        ("fr", 0.2, -0.14),
+        ("hl", -0.2, 0.14),
+        ("hr", -0.2, -0.14),
+    ):
+        roll = _add(model, base, f"{leg}_roll", "RX", (x, y, 0), 0.4, (0, 0, -0.01))
+        for way, sign in (("front", 1.0), ("rear", -1.0)):
+            at = (0.03 * sign, 0, 0)
+            crank = _add(model, roll, f"{leg}_{way}", "RY", at, 0.25, (0, 0, -0.05))
+            rod = _add(model, crank, f"{leg}_{way}_rod", "RY", (0, 0, -0.12), 0.15, (0, 0, -0.1))
+            _frame(model, rod, f"{leg}_{way}_tip", (0, 0, -0.2))
+    return model
+
+
+def five_bars() -> Stance:
+    """The quadruped on four points, motors on hips and cranks, springs in two of the rods."""
+    model = five_bar_model()
+    legs = ("fl", "fr", "hl", "hr")
+    drives = Drives(
+        motors=tuple(f"{leg}_{joint}" for leg in legs for joint in ("roll", "front", "rear")),
+        springs={"fl_front_rod": Spring(3.0, 0.4), "hr_rear_rod": Spring(2.0, -1.0)},
+        loops=tuple(Loop(f"{leg}_rear_tip", f"{leg}_front_tip", "ball") for leg in legs),
+    )
+    robot = Robot.from_model(model, drives=drives)
+    angles = {}
+    for leg in legs:
+        angles |= {f"{leg}_front": -0.7, f"{leg}_front_rod": 1.0}
+        angles |= {f"{leg}_rear": 0.7, f"{leg}_rear_rod": -1.0}
+    q = close(robot, robot.configuration(angles), [name for name in angles if "rod" not in name])
+    contacts = [Contact(f"{leg}_front_tip", kind="point") for leg in legs]
+    return solve_posture(Stance(robot, q, contacts, False), com=(0.01, 0.004, None)).stance

@@ -13,6 +13,7 @@ so unable to move the feet, give
     tau = tau_0 + J_s' mu - J_s' f*      (J_s M_s^-1 J_s') mu = b - J_s M_s^-1 (tau_0 - h_s)
 
 in which mu does not depend on how the load is shared: along J_b' Z = 0 torques change by -J_s' Z.
+Robots with joints that have no motor of their own, or with loads, go by `driven` instead.
 A Moore-Penrose projector would let light joints take everything.
 
 All of it follows from one Cholesky factor of the mass matrix, M = L L', base first:
@@ -30,11 +31,14 @@ from scipy.linalg import lapack
 
 from copsense.arrays import check_type
 from copsense.controllers.controller import Command, Observation
+from copsense.controllers.driven import DrivenTorques
+from copsense.controllers.driven_dynamics import DrivenDynamics
 from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
-from copsense.criterion import Criterion, check_criterion
+from copsense.controllers.unheld import check_unheld
+from copsense.criterion import Criterion, check_criterion, minimum_wrench
 from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance, check_stance
@@ -79,22 +83,35 @@ class BalancingController:
         self.gains = gains
         self.limits = limits
         self.name: str = name or criterion.name
+        driven = bool(stance.robot.drives or stance.loads)
+        self._dynamics = (DrivenDynamics if driven else StandingDynamics)(stance)
+        if driven:
+            check_unheld(stance, criterion if share is None else minimum_wrench(1.0))
         if share is None and limits is not None and limits.any:
             share = ShareWithinLimits(stance, criterion, limits)
         self._share = share or ShareByCriterion(stance, criterion)
-        self._dynamics = StandingDynamics(stance)
         self._gravity = np.array(stance.robot.model.gravity.linear)
         self._com_gains = np.array(gains.com_stiffness), np.array(gains.com_damping)
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
-        decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
-        scale = 1.0 / np.diag(np.linalg.inv(decoupled)) if gains.scaled_by_inertia else 1.0
+        self._driven: DrivenTorques | None = None
+        if isinstance(self._dynamics, DrivenDynamics):
+            self._driven = DrivenTorques(stance, self._dynamics)
+            inertia = self._driven.inertia()
+        else:
+            decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
+            inertia = 1.0 / np.diag(np.linalg.inv(decoupled))
+        scale = inertia if gains.scaled_by_inertia else 1.0
         self._posture_gains = -kp * scale, -kd * scale
         # Where each stacked force stands among the wrenches.
         m = len(self._dynamics.J)
         self._slots = np.flatnonzero(stance.unstack(np.ones(m)).ravel())
         self._wrenches = (len(stance.contacts), 6)
         upright = self._dynamics.base_wrench(-self._dynamics.mass * self._gravity, np.zeros(3))
-        self._compute(upright, np.zeros(len(kp)))
+        if self._driven is None:
+            self._compute(upright, np.zeros(len(kp)))
+        else:
+            still = np.zeros(len(M))
+            self._driven.compute(self._share, upright, np.zeros(len(kp)), still)
 
     def __call__(self, observation: Observation) -> Command:
         """The torques at a state, and the contact wrenches they are to cause."""
@@ -116,7 +133,13 @@ class BalancingController:
             dyn.mass * (acceleration - self._gravity), -dyn.angular_map.dot(spin)
         )
         stiffness, damping = self._posture_gains
-        torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
+        driven = self._driven
+        if driven is None:
+            torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
+        else:
+            posture = stiffness * driven.speeds(away) + damping * driven.speeds(faster)
+            torques, forces = driven.compute(self._share, wrench, posture, faster)
+            forces = forces[: len(self._slots)]
         wrenches = np.zeros(self._wrenches)
         wrenches.put(self._slots, forces)
         return Command(torques, wrenches)

@@ -37,13 +37,6 @@ class StandingDynamics:
                 f"robot {robot.name!r} lives in a plane: a momentum-based controller is spatial. "
                 "Use a robot with a free-floating base."
             )
-        if robot.drives or stance.loads:
-            raise InvalidInputError(
-                f"robot {robot.name!r} has joints without a motor of their own, springs, loops, or "
-                "loads on it: a momentum-based controller here knows motors, contacts and weight "
-                "alone. Analyse it at rest, or control it without them: stance.with_loads(()), "
-                "robot.with_drives(Drives())."
-            )
         self.model: pin.Model = robot.model
         self.data: pin.Data = robot.model.createData()
         self.mass: float = robot.mass
@@ -66,7 +59,11 @@ class StandingDynamics:
             # A point contact's axes are fixed in the world.
             axes = world.rotation.T if contact.kind == "point" else None
             self._contacts.append((at.joint, at.placement, axes, rows))
+        self._begin(stance)
         self.update(stance.q, np.zeros(robot.model.nv))
+
+    def _begin(self, stance: Stance) -> None:
+        """Prepare what a robot with drives and loads has beside this."""
 
     def update(self, q: Float[np.ndarray, " nq"], v: Float[np.ndarray, " nv"]) -> None:
         """Compute everything at a configuration and velocity."""

@@ -58,9 +58,25 @@ class ShareWithinLimits:
             y = quick_optimum(Z.T.dot(H).dot(Z), Z.T.dot(slope), A.dot(Z), left, self._weight)
             if y is not None:
                 return forces + Z.dot(y)
+        if problem.response is not None:
+            return self._yielding(problem.yielding())
         price = _PRICE * float(np.abs(H).max())
         # B' (B forces - base_wrench) = 0 adds nothing to the slope.
         change = quick_optimum(H + price * B.T.dot(B), slope, A, left, self._weight)
         if change is None:
             raise UnsolvedError(float(np.max(-left) / self._weight))
         return forces + change
+
+    def _yielding(self, problem: LoadProblem) -> Float[np.ndarray, " m"]:
+        """The same for a robot whose other rows of the load cannot yield: no motor is there."""
+        A, b = self._rows.over_forces(problem)
+        H, g = self._quadratic.over_forces(problem)
+        B, w = problem.base_map[:6], problem.base_wrench[:6]
+        start, Z = allowed(problem.base_map[6:], problem.base_wrench[6:])
+        price = _PRICE * float(np.abs(H).max())
+        H, g = H + price * B.T.dot(B), g + price * B.T.dot(w)
+        left, slope = b - A.dot(start), H.dot(start) - g
+        change = quick_optimum(Z.T.dot(H).dot(Z), Z.T.dot(slope), A.dot(Z), left, self._weight)
+        if change is None:
+            raise UnsolvedError(float(np.max(-left) / self._weight))
+        return start + Z.dot(change)

@@ -18,9 +18,11 @@ from copsense.criterion import Criterion
 from copsense.errors import UndeterminedWrenchError
 from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
+from copsense.row_space import RowSpace
 from copsense.stance import Stance
 
 _NULL = 1e-9  # curvature, relative to the cost's size, under which a direction is free
+_DEPENDENT = 1e-6  # singular values, relative, under which rows of joints depend on others
 
 
 ShareLoad = Callable[[LoadProblem], Float[np.ndarray, " m"]]
@@ -37,6 +39,7 @@ class ShareByCriterion:
     def __init__(self, stance: Stance, criterion: Criterion) -> None:
         """Read the weights; whether they determine the forces shows at the first problem."""
         self.criterion = criterion
+        self._contact_rows = len(stance.row_names)
         self._levels: list[Quadratic] = []
         level: Criterion | None = criterion
         while level is not None:
@@ -75,6 +78,9 @@ class ShareByCriterion:
             Z = Z @ vectors[:, ~seen]
             if not Z.shape[1]:
                 return np.asarray(forces)
+        if np.abs(Z[: self._contact_rows]).max() < _NULL:
+            # Forces of loops alone, which no contact feels: as the statics, the smallest.
+            return np.asarray(forces - Z @ (Z.T @ forces))
         raise UndeterminedWrenchError(
             f"criterion {self.criterion.name!r} leaves {Z.shape[1]} direction(s) of the contact "
             "forces undetermined. Give it a tie_break such as minimum_wrench(1.0)."
@@ -94,13 +100,17 @@ def well_determined(matrix: np.ndarray, factor: np.ndarray, least: float) -> boo
 
 
 def allowed(
-    B: Float[np.ndarray, "6 m"], wrench: Float[np.ndarray, " 6"]
+    B: Float[np.ndarray, "b m"], wrench: Float[np.ndarray, " b"]
 ) -> tuple[np.ndarray, np.ndarray]:
     """The smallest forces with B f = wrench, and an orthonormal basis of those with B f = 0.
 
-    One Householder QR of B' gives both.
+    One Householder QR of B' gives both. With rows of joints without a motor, which may depend on
+    the base's, it takes a factorisation that finds the rank.
     """
     m = B.shape[1]
+    if len(B) != 6:
+        space = RowSpace(B, _DEPENDENT)
+        return space.least_solution(wrench), space.null
     full = np.zeros((m, m), order="F")
     full[:, :6] = B.T
     # The columns of zeros add reflectors that do nothing.

@@ -166,10 +166,11 @@ def _draw_com(ax: Axes, recording: Recording) -> None:
 
 
 def _draw_torques(ax: Axes, recording: Recording) -> None:
-    torque = recording["torque"].transpose("time", "joint").values
-    names = labels(recording, "joint")
+    motors = "motor" if "motor" in recording["torque"].dims else "joint"
+    torque = recording["torque"].transpose("time", motors).values
+    names = labels(recording, motors)
     ax.plot(recording["time"], torque, color=MUTED, linewidth=0.7, alpha=0.5)
-    standing = _for_scale(recording)["torque"].transpose("time", "joint").values
+    standing = _for_scale(recording)["torque"].transpose("time", motors).values
     largest = np.argsort(-np.abs(standing).max(axis=0))[:_MOST_NAMED]
     handles = []
     for c, j in zip(_CONTACTS, largest, strict=False):

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.errors import InvalidInputError
+from copsense.simulation.mujoco_drives import driven_joints
 from copsense.stance import Stance
 
 Measure = Callable[
@@ -46,8 +47,10 @@ class ContactWrenches:
         self._axes = np.array([stance.placements[k].rotation for k in self._points])
         self._gravity = stance.robot.model.gravity.linear
         self._feet: tuple[tuple[float, np.ndarray], ...] = _feet(stance) if sensors else ()
-        # The engine sums by link, which is quicker than to sum here.
-        alone = len(np.unique(self._links)) == len(names)
+        # The engine sums by link, which is quicker than to sum here, and takes loads and loops in.
+        alone = len(np.unique(self._links)) == len(names) and not (
+            stance.loads or stance.robot.drives.loops
+        )
         self._measure: Measure = (
             self._by_sensor if sensors else self._by_link if alone else self._by_point
         )
@@ -90,9 +93,10 @@ class ContactWrenches:
         points = self._data.contact
         touching = points.efc_address >= 0
         owner = self._contact_of[points.geom[touching, 1]]
-        # The engine's only constraints are these, in their order. Elliptic cones: the solver's
-        # forces are (normal, tangent, tangent) in the point's axes, the rows of its frame.
-        local, frames = self._data.efc_force.reshape(-1, 1, 3), points.frame[touching]
+        # Elliptic cones: the solver's forces are (normal, tangent, tangent) in the point's axes,
+        # the rows of its frame.
+        rows = points.efc_address[touching][:, None] + np.arange(3)
+        local, frames = self._data.efc_force[rows][:, None], points.frame[touching]
         force = (local @ frames.reshape(-1, 3, 3))[:, 0]
         found = np.zeros((len(positions), 2, 3))
         np.add.at(found[:, 0], owner, force)
@@ -116,12 +120,18 @@ class ContactWrenches:
 def _feet(stance: Stance) -> tuple[tuple[float, np.ndarray], ...]:
     """Mass of the link of each contact, and its centre in the contact frame [m]."""
     robot, found, links = stance.robot, [], set()
+    pulled = driven_joints(stance)
     for contact in stance.contacts:
         at = contact.on(robot)
         if at.joint in links or at.joint < 2:
             raise InvalidInputError(
                 f"contact {contact.name!r} shares its link with another contact, or is on the "
                 'base: a sensor cannot tell them apart. Measure wrenches from "contacts".'
+            )
+        if at.joint in pulled:
+            raise InvalidInputError(
+                f"a rod or a load acts on the link of contact {contact.name!r} beside the ground: "
+                'a sensor over the foot feels both. Measure wrenches from "contacts".'
             )
         links.add(at.joint)
         inertia = robot.model.inertias[at.joint]

@@ -207,4 +207,4 @@ class ModelError:
             frame = robot.frame(name)
             point = pin.Inertia(mass, frame.placement.translation, np.zeros((3, 3)))
             model.inertias[frame.parentJoint] += point
-        return Stance(replace(robot, model=model), stance.q, stance.contacts)
+        return Stance(replace(robot, model=model), stance.q, stance.contacts, loads=stance.loads)

@@ -77,7 +77,7 @@ class EventDetector:
         self._ground = float(self._origins[:, 2].mean())
         self._height = float(stance.com[2]) - self._ground
         self._base = stance.q[3:7]
-        self._joints = stance.robot.torque_names
+        self._joints = stance.robot.dof_names
         self._model = stance.robot.model
         self._data = self._model.createData()
 

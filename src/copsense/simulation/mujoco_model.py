@@ -16,6 +16,7 @@ import pinocchio as pin
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
 from copsense.robot import Robot
+from copsense.simulation.mujoco_drives import add_drives, driven_joints, quaternion
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.support_points import support_points
 from copsense.stance import Stance, check_at_rest
@@ -37,14 +38,8 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
             f"robot {robot.name!r} moves in a plane, the simulation in space. Use a robot with a "
             "free-floating base."
         )
-    if robot.drives or stance.loads:
-        raise InvalidInputError(
-            f"robot {robot.name!r} has joints without a motor of their own, springs, loops, or "
-            "loads on it, which are not simulated. Analyse it at rest, or simulate it without: "
-            "stance.with_loads(()), robot.with_drives(Drives())."
-        )
     spec = mujoco.MjSpec()
-    spec.compiler.autolimits = False
+    spec.compiler.autolimits, spec.compiler.degree = False, False
     option = spec.option
     option.timestep, option.gravity = settings.time_step, model.gravity.linear
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -66,6 +61,7 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
                 objtype=mujoco.mjtObj.mjOBJ_SITE,
                 objname=f"contact {contact.name}",
             )
+    add_drives(mujoco, spec, bodies, stance, settings)
     try:
         return spec.compile()
     except ValueError as error:
@@ -85,12 +81,12 @@ def _chains(stance: Stance) -> Iterator[list[int]]:
     MuJoCo gives one body several joints, and rejects bodies without mass.
     """
     model = stance.robot.model
-    stood_on = {contact.on(stance.robot).joint for contact in stance.contacts}
+    used = {contact.on(stance.robot).joint for contact in stance.contacts} | driven_joints(stance)
     chain: list[int] = []
     for i in range(1, model.njoints):
         chain.append(i)
         empty = i > 1 and not model.inertias[i].mass and not model.inertias[i].inertia.any()
-        if not (empty and list(model.children[i]) == [i + 1] and i not in stood_on):
+        if not (empty and list(model.children[i]) == [i + 1] and i not in used):
             yield chain
             chain = []
 
@@ -101,7 +97,9 @@ def _add_body(mujoco: Any, robot: Robot, chain: Sequence[int], parent: Any) -> A
     place, inertia = pin.SE3.Identity(), model.inertias[i]
     for number in chain:
         place = place * model.jointPlacements[number]
-    body = parent.add_body(name=f"body {model.names[i]}", pos=place.translation, quat=_wxyz(place))
+    body = parent.add_body(
+        name=f"body {model.names[i]}", pos=place.translation, quat=quaternion(place)
+    )
     body.explicitinertial = True
     body.mass, body.ipos = inertia.mass, inertia.lever
     at_com = inertia.inertia
@@ -155,7 +153,7 @@ def _add_contact(
     """Add a contact's frame, its support points and the plane below them."""
     at = contact.on(robot)
     body, place = bodies[at.joint], at.placement
-    body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=_wxyz(place))
+    body.add_site(name=f"contact {contact.name}", pos=place.translation, quat=quaternion(place))
     up = world.rotation[:, 2]
     point = contact.kind == "point"
     spec.worldbody.add_geom(
@@ -164,7 +162,7 @@ def _add_contact(
         size=[0.0, 0.0, 1.0],
         # A point's ball is centred on the point; a sole's balls touch the sole from above.
         pos=world.translation + (_PRESSED - (_POINT if point else 0.0)) * up,
-        quat=_wxyz(world),
+        quat=quaternion(world),
         contype=0,
         conaffinity=0,
     )
@@ -187,8 +185,3 @@ def _add_contact(
             friction=[friction, friction, 0.0, 0.0, 0.0],
             solref=[settings.contact_time, 1.0],
         )
-
-
-def _wxyz(place: pin.SE3) -> list[float]:
-    x, y, z, w = pin.Quaternion(place.rotation).coeffs()
-    return [w, x, y, z]

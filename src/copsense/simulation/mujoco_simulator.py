@@ -1,7 +1,7 @@
 """MujocoSimulator: a stance in MuJoCo, with the robot and contacts that the analysis uses.
 
 `load_mujoco` imports the package for everything in `copsense.simulation`. Before the first step,
-mass matrix, bias forces and centre of mass are compared with Pinocchio's.
+mass matrix, bias forces, centre of mass, springs, loads and loops are compared with Pinocchio's.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import pinocchio as pin
 from jaxtyping import Float, Int
 
 from copsense.arrays import is_finite
+from copsense.closing import close
 from copsense.errors import (
     EngineMismatchError,
     InvalidInputError,
@@ -24,6 +25,7 @@ from copsense.errors import (
 from copsense.extras import require
 from copsense.robot import Robot
 from copsense.simulation.contact_wrenches import ContactWrenches
+from copsense.simulation.mujoco_drives import DriveForces
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
@@ -94,6 +96,8 @@ class MujocoSimulator:
         self._round = np.array([i for i, circle in self._circles if circle], dtype=int)
         self._contact_of_pair = self._wrenches.contact_of_pairs()
         self._friction = self._model.pair_friction.copy()
+        driven = bool(stance.robot.drives or stance.loads)
+        self._drive = DriveForces(self._mujoco, self._model, data, stance) if driven else None
         self._compare()
         self.reset()
 
@@ -126,7 +130,11 @@ class MujocoSimulator:
         """Advance by one time step; see `Simulator.step`."""
         data, applied, before = self._data, self._applied, float(self._data.time)
         # Motors and pushes are generalised forces, without MuJoCo's gears and ranges.
-        applied[self._joints] = torques
+        if self._drive is None:
+            applied[self._joints] = torques
+        else:
+            applied[self._joints] = self._drive.on_joints(torques)
+            self._drive.apply_loads()
         applied[:6] = 0.0
         if external is not None:
             base = pin.Quaternion(*self._qpos[3:7]).matrix()
@@ -203,6 +211,8 @@ class MujocoSimulator:
         for size in (0.0, 0.3):
             q = pin.integrate(model, self._stance.q, size * random.uniform(-1, 1, model.nv))
             v = size * random.uniform(-1, 1, model.nv)
+            if self._drive is not None:
+                q = close(robot, q)
             self._move(q, v)
             self._mujoco.mj_forward(self._model, self._data)
             M = np.zeros((model.nv, model.nv))
@@ -222,8 +232,11 @@ class MujocoSimulator:
                     pin.centerOfMass(model, model.createData(), q),
                 ),
             }
+            if self._drive is not None:
+                pairs |= self._drive.pairs(q, self._columns, world)
             for what, (here, there) in pairs.items():
-                off = float(np.abs(here - there).max()) / max(1.0, float(np.abs(there).max()))
+                off = float(np.abs(here - there).max(initial=0.0))
+                off /= max(1.0, float(np.abs(there).max(initial=0.0)))
                 if not off <= _AGREEMENT:
                     raise EngineMismatchError(
                         f"MuJoCo and Pinocchio disagree on the {what} of {robot.name!r}, "

@@ -44,8 +44,8 @@ class StaticPrediction(ShortRepr):
         cops: centre of pressure of each contact (N, nc, 2), contact axes [m]; NaN where unloaded.
         margins: smallest distance of a centre of pressure to its sole's edge (N,) [m]; infinite
             without soles, NaN where a contact carries no load.
-        torques: joint torques (N, n) [Nm].
-        joints: position of each joint (N, n) [rad, m].
+        torques: of the motors (N, n) [Nm].
+        joints: position of each joint (N, j) [rad, m].
         excursion: how far from the start the path's coordinate may go until a contact's CoP reaches
             an edge, its load is gone, or its force leaves the friction cone [m]; infinite where
             none does on this path.
@@ -61,7 +61,7 @@ class StaticPrediction(ShortRepr):
     cops: Float[np.ndarray, "N nc 2"]
     margins: Float[np.ndarray, " N"]
     torques: Float[np.ndarray, "N n"]
-    joints: Float[np.ndarray, "N n"]
+    joints: Float[np.ndarray, "N j"]
     excursion: float
     contact: str
     how: str

@@ -46,6 +46,11 @@ _VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "joint_velocity": (("joint",), "rad/s, m/s", "joint velocity"),
     "tilt": (("contact",), "rad", "angle of the contact frame from its plane"),
 }
+# Of a robot on which not every joint has a motor of its own.
+_OF_MOTORS: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "torque": (("motor",), "N m", "torque of each motor (force for a prismatic joint)"),
+    "torque_command": (("motor",), "N m", "torque commanded of each motor"),
+}
 
 
 class Recorder:
@@ -113,9 +118,11 @@ class Recorder:
         import xarray as xr
 
         stance = self.stance
+        motors = stance.robot.actuation
+        variables = _VARIABLES if motors is None else _VARIABLES | _OF_MOTORS
         data: dict[str, Any] = {
             name: (("time", *dims), np.array(self._rows[name]), {"units": unit, "long_name": what})
-            for name, (dims, unit, what) in _VARIABLES.items()
+            for name, (dims, unit, what) in variables.items()
         }
         cops, margins = _cops(stance, data["wrench"][1])
         data["cop"] = (
@@ -147,8 +154,10 @@ class Recorder:
             "com_axis": ["x", "y", "z"],
             "contact_axis": ["x", "y", "z"],
             "component": list(COMPONENT_NAMES),
-            "joint": list(stance.robot.torque_names),
+            "joint": list(stance.robot.dof_names),
         }
+        if motors is not None:
+            coordinates["motor"] = list(motors.motors)
         words = {
             "title": f"Balancing of {stance.robot.name}",
             "source": f"copsense {__version__}",

@@ -129,11 +129,11 @@ class Recording(LabelledResult):
     def torque_norm(self) -> float:
         """Mean over time of the norm of the torques before the first tip [Nm]."""
         torque = self.before_first_tip["torque"]
-        return float(((torque**2).sum("joint") ** 0.5).mean())
+        return float(((torque**2).sum(str(torque.dims[1])) ** 0.5).mean())
 
     @property
     def torque_peak(self) -> float:
-        """Largest torque of any joint before the first tip [Nm]."""
+        """Largest torque of any motor before the first tip [Nm]."""
         return float(abs(self.before_first_tip["torque"]).max())
 
     def between(self, start: float, stop: float) -> Recording:

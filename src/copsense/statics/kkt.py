@@ -54,6 +54,7 @@ class Kkt:
         K[size:, size:] = -quadratic.wrench
         self.system: SymmetricSystem = SymmetricSystem(K)
         self.free: Float[np.ndarray, "m z"] = np.zeros((len(J), 0))
+        self._unfelt = self.free
         if self.system.singular:
             # Forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers may be
             # free too (a massless foot), which changes neither forces nor torques.
@@ -61,7 +62,7 @@ class Kkt:
             self.free = vt[int(np.sum(s > _NULL * s[0])) :].T
             # Forces of loops alone may be free: contacts and motors do not feel them.
             if np.abs(self.free[: len(stance.row_names)]).max(initial=0.0) < _NULL:
-                self.free = self.free[:, :0]
+                self._unfelt, self.free = self.free, self.free[:, :0]
             self.system.use_pseudo_inverse()
         self.tie: TieBreak | None = None
         if self.free.shape[1]:
@@ -83,6 +84,8 @@ class Kkt:
             x[self.size :] += self.tie.move(problem, x[self.size :])
         nu = np.zeros(len(self.on))
         nu[self.on], forces = x[: self.size], x[self.size :]
+        if self._unfelt.shape[1]:  # the smallest, whatever the scaling of the system
+            forces = forces - self._unfelt @ (self._unfelt.T @ forces)
         return forces, problem.torques(forces), self.stance.robot.from_drives(nu)
 
     def derivative(
