@@ -147,6 +147,17 @@ def test_a_failed_run_makes_the_exit_code_one(tmp_path):
     assert "failed: icub / width=3 / minimum-torque / rest:" in answer.err
 
 
+def test_every_case_runs_at_the_control_period_asked_for(tmp_path):
+    rest = ("benchmark", "icub", "--posture", "own", "--criterion", "minimum-torque", "--jobs", 1,
+            "--disturbance", "rest:duration=0.1")  # fmt: skip
+    table = tmp_path / "table.csv"
+    assert copsense(*rest, "--control-period", "2ms", "--output", table).code == 0
+    assert '"control_period": 0.002' in load_benchmark(table)["parameters"][0]
+    wrong = copsense(*rest, "--control-period", "1.5ms")
+    assert wrong.code == 1
+    assert "0.0015 s is not a multiple" in wrong.err
+
+
 def test_a_picture_shows_bounds_failures_and_predictions():
     rows = [
         {

@@ -10,7 +10,7 @@ from support.reproductions import blank_pictures, small_reproduction
 import copsense
 from copsense.paper.claims import Verdict, evaluate_sway_claims, stretch
 from copsense.paper.report import report_figures, write_report
-from copsense.paper.report.closed_loop_section import score_rows, sway_runs
+from copsense.paper.report.closed_loop_section import score_rows, sway_rates, sway_runs
 from copsense.paper.reproduce import LIMITS, sway_in_simulation
 from copsense.plots import render_figure
 
@@ -57,6 +57,10 @@ def test_measured_cops_are_the_static_ones_but_for_the_acceleration(sway):
     w = 2 * np.pi * sway.frequency
     lead = 0.6 / 9.8 * w**2 * sway.amplitude
     assert np.abs(found.cop - found.static_cop).max() < 2.5 * lead
+
+
+def test_the_report_says_how_often_torques_are_commanded(sway):
+    assert sway_rates(sway) == {"control": "500", "physics": "1000"}
 
 
 def test_claims_fail_on_other_recordings(sway):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.controller_options import (
+    control_period_option,
     controller_options,
     read_gains,
     read_own_controller,
@@ -56,14 +57,7 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     "--duration", type=TIME, metavar="TIME", help="Default: one period, the ramp and 1 s, or 2 s."
 )
 @controller_options
-@click.option(
-    "--control-period",
-    type=TIME,
-    default=1e-3,
-    show_default=True,
-    metavar="TIME",
-    help="Time between two steps of the controller [s], a multiple of the physics' 1 ms.",
-)
+@control_period_option
 @click.option(
     "--wrenches",
     type=click.Choice(["contacts", "sensors"]),

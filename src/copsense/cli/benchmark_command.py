@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import click
 
+from copsense.cli.controller_options import control_period_option
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
@@ -78,6 +79,7 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     show_default=True,
     help="Gains: stiff, or soft ones like those the authors published.",
 )
+@control_period_option
 @click.option(
     "--contact", "contacts", multiple=True, metavar="FRAME", help="Contact frame. Repeatable."
 )
@@ -192,14 +194,24 @@ def _plan(
     disturbances: tuple[str, ...],
     limits: str | None,
     gains: str,
+    control_period: float,
     contacts: tuple[str, ...],
     repeats: int | None,
     seed: int | None,
     quick: bool,
 ) -> tuple[Case, ...]:
     """The cases that the options ask for."""
-    from copsense.comparison import ControllerChoice, PostureChoice, RobotChoice, make_plan
+    from copsense.comparison import (
+        Conditions,
+        ControllerChoice,
+        PostureChoice,
+        RobotChoice,
+        make_plan,
+    )
+    from copsense.simulation import Scenario
 
+    usual_period = control_period == Scenario.control_period
+    conditions = Conditions(values=None if usual_period else {"control_period": control_period})
     within = read_limits(limits)
     file = remembered_stance()
     chosen_criteria: list[str | Mapping[str, Any]] = list(dict.fromkeys(criteria))
@@ -226,7 +238,7 @@ def _plan(
         for posture in chosen:
             robot.check_own(posture)
             posture.angles(source)
-        cases += make_plan([robot], chosen, controllers, trials)
+        cases += make_plan([robot], chosen, controllers, trials, [conditions])
     return tuple(cases)
 
 

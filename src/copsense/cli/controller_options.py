@@ -1,4 +1,4 @@
-"""Controller: the options of ``copsense balance`` that say which one, and how stiff."""
+"""Controller: the options that say which one, how stiff, and how often it is asked."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.units import read_assignments
+from copsense.cli.units import TIME, read_assignments
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
@@ -45,6 +45,19 @@ def controller_options(command: F) -> F:
         ),
     ]
     return with_options(options[::-1], command)
+
+
+def control_period_option(command: F) -> F:
+    """How often the controller is asked."""
+    option = click.option(
+        "--control-period",
+        type=TIME,
+        default=1e-3,
+        show_default=True,
+        metavar="TIME",
+        help="Time between two steps of the controller [s], a multiple of the physics' 1 ms.",
+    )
+    return with_options([option], command)
 
 
 def read_own_controller(source: str, changes: tuple[str, ...], stance: Stance) -> Controller:

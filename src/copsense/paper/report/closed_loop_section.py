@@ -137,6 +137,15 @@ def sway_runs(sway: Sway) -> list[dict[str, str]]:
     return rows
 
 
+def sway_rates(sway: Sway) -> dict[str, str]:
+    """How often torques are commanded and the physics advances [Hz], alike in every run."""
+    attributes = sway.left.attrs
+    return {
+        "control": f"{1.0 / float(attributes['control_period']):g}",
+        "physics": f"{1.0 / float(attributes['time_step']):g}",
+    }
+
+
 def score_rows(table: pd.DataFrame) -> list[dict[str, str]]:
     """A row for each score: simulated, predicted, and the controller's rank."""
     ranks = rank_scores(table)["rank"].reindex(table.index)

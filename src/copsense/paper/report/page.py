@@ -15,6 +15,7 @@ from copsense.paper.report.closed_loop_section import (
     score_rows,
     score_words,
     sway_differences,
+    sway_rates,
     sway_runs,
 )
 from copsense.paper.report.report_figure import ReportFigure
@@ -87,6 +88,7 @@ def render_page(
         limit_words=limit_words(reproduction.within_limits.limits),
         bindings=[_binding(b) for b in reproduction.within_limits.bindings],
         sway_runs=sway_runs(reproduction.sway) if reproduction.sway else [],
+        rates=sway_rates(reproduction.sway) if reproduction.sway else {},
         scores=[] if reproduction.benchmark is None else score_rows(reproduction.benchmark),
         score_words=() if reproduction.benchmark is None else score_words(reproduction.benchmark),
         sway_differences=sway_differences(reproduction.sway) if reproduction.sway else (),

@@ -137,6 +137,7 @@ def _balance_commands(sway: Sway | None) -> tuple[str, ...]:
         return ()
     narrow, wide = sway.amplitude, sway.limited_amplitude
     within = limits_option(sway.limits)
+    period = f" --control-period {float(sway.left.attrs['control_period']) * 1e3:g}ms"
     runs = [
         ("minimum-wrench", narrow, "", ""),
         ("minimum-wrench", -narrow, "_right", ""),
@@ -146,10 +147,11 @@ def _balance_commands(sway: Sway | None) -> tuple[str, ...]:
     return (
         *(
             f"copsense balance icub --criterion {name} --reference sine:{amplitude:g}:"
-            f"{sway.frequency:g}{limits} --output {name}{suffix}.nc --plot {name}{suffix}.png"
+            f"{sway.frequency:g}{limits}{period} --output {name}{suffix}.nc "
+            f"--plot {name}{suffix}.png"
             for name, amplitude, suffix, limits in runs
         ),
-        "copsense benchmark icub --output benchmark.csv --plot benchmark.png",
+        f"copsense benchmark icub{period} --output benchmark.csv --plot benchmark.png",
     )
 
 

@@ -7,6 +7,7 @@ import os
 import pandas as pd
 
 from copsense.comparison import (
+    Conditions,
     ControllerChoice,
     Lean,
     PostureChoice,
@@ -17,6 +18,7 @@ from copsense.comparison import (
     run_benchmark,
 )
 from copsense.paper.reproduce.clock import Clock
+from copsense.paper.reproduce.closed_loop import CONTROL_PERIOD
 
 _JOBS = 4  # processes at most that simulate
 
@@ -30,8 +32,9 @@ def benchmark_in_simulation(clock: Clock) -> pd.DataFrame:
         PostureChoice("feet 0.20 m apart", width=0.2),
     )
     controllers = [ControllerChoice(name) for name in ("minimum-wrench", "minimum-torque")]
-    plan = make_plan(robots, [straight, *others], controllers, [Lean()])
-    plan += make_plan(robots, [straight], controllers, [PushToTip(), Sway()])
+    ideal = [Conditions(values={"control_period": CONTROL_PERIOD})]
+    plan = make_plan(robots, [straight, *others], controllers, [Lean()], ideal)
+    plan += make_plan(robots, [straight], controllers, [PushToTip(), Sway()], ideal)
     parts, done = 100, 0.0
     with clock.stage("closed loop: benchmark", parts) as advance:
 

@@ -13,6 +13,8 @@ from copsense.simulation import MujocoSimulator, Recording, Scenario, rollout
 from copsense.simulation.prediction import farther_side, predict, predict_lean
 from copsense.stance import Stance
 
+# s between two commands, of two physics steps: the robot's own loops run at 100 Hz to 1 kHz.
+CONTROL_PERIOD = 2e-3
 _RECORD = 0.02  # s between recorded rows
 _FARTHER = 1.5  # amplitudes: as far a lean is followed to its first edge
 
@@ -48,7 +50,7 @@ def sway_in_simulation(
     """
     simulator = MujocoSimulator(stance)
     reference = lateral_reference(stance, Sine(amplitude, frequency))
-    scenario = Scenario(periods / frequency, reference)
+    scenario = Scenario(periods / frequency, reference, control_period=CONTROL_PERIOD)
     total = round(scenario.duration / scenario.control_period)
 
     def run(
