@@ -39,7 +39,14 @@ def test_example_runs_and_its_numbers_hold(example):
 
 @pytest.mark.parametrize(
     "page",
-    ["README.md", "docs/adding.md", "docs/balancing.md", "docs/maps.md", "docs/postures.md"],
+    [
+        "README.md",
+        "docs/adding.md",
+        "docs/balancing.md",
+        "docs/logs.md",
+        "docs/maps.md",
+        "docs/postures.md",
+    ],
 )
 def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -20,6 +20,11 @@ TABLE = "Analysis"  # reads as the command's table, which is as long as its crit
 INTERNAL = (
     "copsense.batch",
     "copsense.comparison.plan_file",
+    "copsense.logs.channel",
+    "copsense.logs.log_motion",
+    "copsense.logs.matlab_tree",
+    "copsense.logs.one_clock",
+    "copsense.logs.selection",
     "copsense.maps.reduction",
     "copsense.mjcf",
     "copsense.paper",

@@ -60,6 +60,10 @@ class ModelLoadError(CopsenseError):
     """A robot description could not be read (missing, malformed, or with a missing mesh)."""
 
 
+class LogReadError(CopsenseError):
+    """A log file could not be read (missing, cut short, damaged, or of an unknown format)."""
+
+
 class MissingExtraError(CopsenseError, ImportError):
     """An optional package is needed; the message names the extra to install."""
 

@@ -19,6 +19,10 @@ EXTRA_OF = {
     "imageio_ffmpeg": "video",
     "zarr": "map",
     "distributed": "cluster",
+    "h5py": "logs",
+    "pyarrow": "logs",
+    "rosbags": "logs",
+    "ezc3d": "logs",
 }
 
 

@@ -19,6 +19,7 @@ from copsense.labelled import LabelledResult
 from copsense.limits import limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.loads import SpringLoad
+from copsense.logs import JointsMap, Log, LogMap, WrenchMap, WrenchSeries, compare_log
 from copsense.maps import MapPlan
 from copsense.maps.map_statistics import CriterionSummary as Summary
 from copsense.maps.map_statistics import FailedPosture, MapSummary, WorstPosture
@@ -46,6 +47,25 @@ def own_policy(q: np.ndarray) -> np.ndarray:
     wrenches = np.zeros((2, 6))
     wrenches[:, 2] = robot.weight / 2
     return wrenches
+
+
+def small_log(icub) -> Log:
+    """Forty rows of a sway that no one made, with forces that are the weight's."""
+    times = np.arange(40) * 0.05
+    sway = 0.02 * np.sin(2 * np.pi * times)
+    names = icub.robot.joint_names
+    positions = np.tile([icub.robot.joint_position(icub.q, name) for name in names], (40, 1))
+    for joint in ("l_hip_roll", "r_ankle_roll"):
+        positions[:, names.index(joint)] += sway
+    for joint in ("r_hip_roll", "l_ankle_roll"):
+        positions[:, names.index(joint)] -= sway
+    forces = np.zeros((2, 40, 6))
+    forces[:, :, 2] = icub.robot.weight * (0.5 + np.outer((1, -1), sway))
+    sensors = tuple(
+        WrenchSeries(name, name, "", "sole", f)
+        for name, f in zip(icub.contact_names, forces, strict=True)
+    )
+    return Log("made up", times, names, positions, sensors, torques=0 * positions)
 
 
 def all_results(icub) -> dict[str, object]:
@@ -110,6 +130,12 @@ def all_results(icub) -> dict[str, object]:
         "scenario": Scenario(1.0, model_error=ModelError(payload={"chest": 2.0})),
         "controller": BalancingController(icub, TORQUE),
         "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),
+        "log": small_log(icub),
+        "comparison of a log": compare_log(small_log(icub), icub, [TORQUE], skip=0.0),
+        "mapping of a log": LogMap(
+            JointsMap({"l_knee": "k"}, rename={"k": "l_knee"}),
+            (WrenchMap("l_sole", {"force_z": "fz"}),),
+        ),
         "preset": PRESETS["icub"],
         "batch": kernel.evaluate(bar.q[None]),
         "kernel": kernel,

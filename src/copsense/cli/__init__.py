@@ -29,6 +29,7 @@ _COMMANDS = {
         ("push", "push", "Push a robot that stands: how hard, from where, and what gives way."),
         ("design", "design", "Design the weights of a criterion that goes farther."),
         ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
+        ("log", "log", "Compare a robot's own log with what every criterion says."),
         ("benchmark", "benchmark", "Compare balancing controllers in simulation."),
         ("four-bar", "four_bar", "Solve the paper's four-bar linkage in closed form."),
         ("reproduce", "reproduce", "Reproduce the paper and write a report."),

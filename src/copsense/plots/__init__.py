@@ -21,6 +21,7 @@ from copsense.plots.curve_plots import (
 )
 from copsense.plots.design_plots import plot_design
 from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_regions
+from copsense.plots.log_plots import plot_log
 from copsense.plots.map_plots import plot_map
 from copsense.plots.push_plots import plot_pushes
 from copsense.plots.recording_plots import plot_rollout
@@ -38,6 +39,7 @@ __all__ = [
     "plot_limit_margins",
     "plot_limited",
     "plot_load",
+    "plot_log",
     "plot_map",
     "plot_margin",
     "plot_pushes",

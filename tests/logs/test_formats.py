@@ -1,0 +1,108 @@
+"""What a simulation recorded, written in every format and read back, is what it was."""
+
+import numpy as np
+import pytest
+from support import log_files
+
+from copsense.logs import LogMap, compare_log, read_log
+from copsense.logs.log_statics import wrench_cops
+
+FORMATS = {
+    "log.csv": log_files.write_csv,
+    "log.parquet": log_files.write_parquet,
+    "v5.mat": log_files.write_matlab5,
+    "v73.mat": log_files.write_matlab73,
+    "simulink.mat": log_files.write_simulink,
+    "ros1.bag": log_files.write_bag,
+    "ros2_mcap": log_files.write_bag,
+    "ros2_sqlite": log_files.write_bag,
+    "eurobench": log_files.write_eurobench,
+}
+
+
+@pytest.fixture(scope="module")
+def read_back(icub, data, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("formats")
+
+    def read(name, **options):
+        path = folder / name
+        if not path.exists():
+            FORMATS[name](path, data)
+        if name == "simulink.mat":
+            options.setdefault("log_map", LogMap.from_dict(log_files.simulink_map(data)))
+        return read_log(path, robot=icub.robot, contacts=data.contacts, **options)
+
+    read.folder = folder
+    return read
+
+
+def cops_of(log, contacts):
+    return wrench_cops(np.stack([log.wrench(name).values for name in contacts], axis=1))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_cops_and_joints_come_back(read_back, data, name):
+    log = read_back(name)
+    N = len(data.t) - 1  # the last row is half a step after the one before
+    assert len(log.times) == N
+    np.testing.assert_allclose(log.times, data.t[:-1] - data.t[0], atol=1e-6)
+    order = [log.joint_names.index(j) for j in data.joints]
+    np.testing.assert_allclose(log.positions[:, order], data.q[:N], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(cops_of(log, data.contacts)[1:], data.cop[1:N], rtol=0, atol=1e-9)
+    if name != "simulink.mat":
+        np.testing.assert_allclose(log.torques[:, order], data.tau[:N], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(log.velocities[:, order], data.v[:N], rtol=0, atol=1e-9)
+
+
+def test_a_recording_of_our_own_comes_back(sway_file, data):
+    log = read_log(sway_file)
+    np.testing.assert_array_equal(log.positions, data.q[:-1])
+    np.testing.assert_allclose(cops_of(log, data.contacts)[1:], data.cop[1:-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(log.base[:, :3], data.base[:-1, :3], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ros1.bag", "ros2_mcap", "eurobench"])
+def test_the_base_comes_back(read_back, data, name):
+    base = read_back(name).base
+    np.testing.assert_allclose(base[:, :3], data.base[:-1, :3], atol=1e-9)
+    same = np.abs(np.sum(base[:, 3:] * data.base[:-1, 3:], axis=1))
+    np.testing.assert_allclose(same, 1.0, atol=1e-9)
+
+
+def test_one_mcap_file_is_a_bag(read_back, data):
+    read_back("ros2_mcap")
+    (file,) = (read_back.folder / "ros2_mcap").glob("*.mcap")
+    log = read_log(file)
+    np.testing.assert_allclose(
+        log.positions[:, log.joint_names.index("l_knee")], data.q[:-1, data.joints.index("l_knee")]
+    )
+
+
+def test_a_mapping_is_written_once_and_used_again(read_back, icub, data):
+    from copsense.logs.opening import open_log_file
+    from copsense.logs.recognition import recognise
+
+    read_back("v73.mat")
+    path = read_back.folder / "v73.mat"
+    recognised = recognise(open_log_file(path), icub.robot, data.contacts)
+    saved = recognised.save(read_back.folder / "map.toml")
+    assert LogMap.load(saved).to_dict() == recognised.to_dict()
+    again = read_log(path, saved)
+    np.testing.assert_array_equal(again.positions, read_back("v73.mat").positions)
+
+
+def test_a_rate_gives_means_of_the_samples(read_back, data):
+    step = data.t[1] - data.t[0]
+    log = read_back("log.csv", rate=1 / (4 * step))
+    N = len(data.t) // 4 - 1  # the last step was only begun
+    assert len(log.times) == N
+    expected = data.q[: 4 * N].reshape(N, 4, -1).mean(axis=1)
+    order = [log.joint_names.index(j) for j in data.joints]
+    np.testing.assert_allclose(log.positions[:N, order], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["log.parquet", "ros2_mcap"])
+def test_measured_cops_stand_beside_the_criteria(read_back, icub, data, name):
+    found = compare_log(read_back(name), icub, skip=0.4)
+    at = np.searchsorted(data.t - data.t[0], found.times - 1e-4)
+    np.testing.assert_allclose(found.cops, data.cop[at], rtol=0, atol=1e-9)

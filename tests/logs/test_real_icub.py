@@ -1,0 +1,46 @@
+"""A real iCub that sways moves its load as minimum torque says, and not as minimum wrench does."""
+
+import pytest
+from support.commands import copsense as command
+from support.public_log import public_log
+
+
+@pytest.fixture(scope="module")
+def answer():
+    log, urdf = public_log()
+    return command("log", log, "--robot", urdf, "--json").json
+
+
+# Found by scripts of their own: plain Pinocchio and KKT, feet fixed at l_sole.
+@pytest.mark.parametrize(
+    ("source", "slope"),
+    [
+        ("measured", 0.611),
+        ("minimum-torque, at rest", 0.57),
+        ("minimum-torque, in motion", 0.642),
+        ("minimum-wrench, at rest", 0.011),
+    ],
+)
+def test_slope_of_the_load(answer, source, slope):
+    assert answer["slopes"]["load"][source]["value"] == pytest.approx(slope, abs=0.015)
+
+
+def test_sway_and_stance(answer):
+    assert answer["sway"]["frequency"] == pytest.approx(0.2, abs=0.005)
+    assert answer["sway"]["amplitude"] == pytest.approx(0.028, abs=1e-3)
+    assert answer["feet_distance"] == pytest.approx(0.212, abs=1e-3)
+    assert answer["normal_force"]["mean"] == pytest.approx(334.9, abs=0.2)
+    assert answer["slopes"]["load"]["measured"]["phase_deg"] == pytest.approx(-4, abs=1)
+
+
+def test_minimum_torque_in_motion_is_inside_the_interval(answer):
+    load = answer["slopes"]["load"]
+    low, high = load["measured"]["low"], load["measured"]["high"]
+    assert low < load["minimum-torque, in motion"]["value"] < high
+    assert not low < load["minimum-wrench, in motion"]["value"] < high
+
+
+def test_what_the_log_lacks_is_said(answer):
+    kinds = {finding["kind"] for finding in answer["findings"]}
+    assert {"clock", "total", "offset"} <= kinds
+    assert any("l_wrist_yaw" in note for note in answer["notes"])
