@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -27,6 +27,7 @@ from copsense.posture import supporting_joints
 from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
 from copsense.stance import Stance
+from copsense.statics import with_tie_breaks
 
 Objective = Literal["travel", "gain"]
 NO_LIMIT = "none within the path"  # a score's first limit where the path ends before any
@@ -164,7 +165,9 @@ def design_criterion(
     A grid over the parameters, then ever narrower simplex searches from the best point.
 
     Args:
-        path: postures to either side of its middle one, such as a lateral sweep.
+        path: postures to either side of its middle one, such as a lateral sweep; those that were
+            not reached, and what lies beyond them on either side, are left out, and ``notes`` say
+            so.
         limits: what ends the travel.
         family: the criteria to choose from, one of `families` or its name.
         objective: ``"travel"`` maximises the smallest travel to a limit; ``"gain"`` minimises the
@@ -173,7 +176,8 @@ def design_criterion(
         progress: called with 1 after each point of the grid.
 
     Raises:
-        InvalidInputError: a path with failures or too few postures, or no criterion that works.
+        UnreachablePostureError: the middle of the path was not reached.
+        InvalidInputError: too few postures around the middle, or no criterion that works.
         UnknownNameError: another objective, or no family of that name.
     """
     check_path(path)
@@ -181,18 +185,27 @@ def design_criterion(
     family = family_named(path.stances[0], family)
     if objective not in ("travel", "gain"):
         raise UnknownNameError("objective", objective, ("travel", "gain"))
+    whole, path = path, path.reached()
     if len(path) < 5:
         raise InvalidInputError(
-            f"a design needs a path of 5 postures or more, this one has {len(path)}. Give more."
-        )
-    if path.failures:
-        raise InvalidInputError(
-            f"{len(path.failures)} of the path's {len(path)} postures were not reached, and a "
-            "design needs all of them. Sweep less far."
+            f"a design needs 5 postures of the path or more, around its middle; {len(path)} of "
+            f"{len(whole)} were reached there. Give more of them, nearer together."
         )
     if grid < 2:
         raise InvalidInputError(f"the grid needs 2 values a parameter or more, got {grid}.")
-    both = (minimum_wrench(1.0), minimum_torque())
+    part: tuple[str, ...] = ()
+    if len(path) < len(whole):
+        part = (
+            f"the path's {len(path)} postures around its middle are used, {path.coordinate} "
+            f"{path.values[0]:.4g} to {path.values[-1]:.4g} {path.unit}; of those beyond, "
+            f"{len(whole.failures)} were not reached.",
+        )
+    # What only the torques choose may leave forces that contacts exert against each other.
+    usual = {c.name: c for c in (minimum_wrench(1.0), minimum_torque())}
+    tied, notes = with_tie_breaks(path.stances, usual)
+    both = tuple(c for c in tied.values() if isinstance(c, Criterion))
+    if notes:
+        family = replace(family, build=partial(_tied, family.build))
     reach = min(score(path, limits, criterion, {}).travel for criterion in both)
     baselines = tuple(score(path, limits, criterion, {}, reach) for criterion in both)
 
@@ -232,7 +245,7 @@ def design_criterion(
         family.name,
         at_bound,
         path.stances[0].robot.name,
-        path.stances[0].robot.notes,
+        (*path.stances[0].robot.notes, *part, *notes),
     )
 
 
@@ -347,6 +360,10 @@ def score(
         float(np.sqrt(np.mean([np.sum(point.torques**2) for point in taken]))),
         reach,
     )
+
+
+def _tied(build: Callable[[Sequence[float]], Criterion], values: Sequence[float]) -> Criterion:
+    return replace(build(values), tie_break=minimum_wrench(1.0))
 
 
 def _of_length(values: Sequence[float]) -> Criterion:

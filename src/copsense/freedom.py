@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.contact import Contact
+from copsense.errors import InvalidInputError
 from copsense.stance import RANK_TOLERANCE, Stance
 
 _AXES = (
@@ -24,6 +25,25 @@ def held_com_axes(stance: Stance) -> tuple[int, ...]:
     speeds = stance.com_jacobian @ stance.admissible_motions
     still = np.linalg.norm(speeds, axis=1) < _STILL
     return tuple(int(axis) for axis in np.flatnonzero(still))
+
+
+def check_com_moves(stance: Stance, axis: int) -> None:
+    """Reject a path along an axis of the world on which the contacts hold the centre of mass.
+
+    Raises:
+        InvalidInputError: no motion with the contacts in place moves it there.
+    """
+    held = held_com_axes(stance)
+    if axis not in held:
+        return
+    free = [f"CoM {'xyz'[i]}" for i in range(3) if i not in held]
+    lacking = "; ".join(missing_joints(stance))
+    raise InvalidInputError(
+        f"the contacts of {stance.robot.name!r} hold the CoM's {'xyz'[axis]} fast: no posture with "
+        "them in place moves it."
+        + (f" {lacking[0].upper()}{lacking[1:]}." if lacking else "")
+        + f" Move {' or '.join([*free, 'a joint'])} instead, or give fewer contacts, or points."
+    )
 
 
 def missing_joints(stance: Stance) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -109,7 +109,7 @@ class LabelledResult:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know about the robot, such as what of its file is not used.
+        """What to know about robot and criteria, such as what of the file is not used.
 
         Empty for a file of an earlier version, which did not record it.
         """
@@ -135,6 +135,10 @@ class LabelledResult:
     def with_attributes(self: R, **attributes: Any) -> R:
         """The same result with attributes added or replaced."""
         return type(self)(self._dataset.assign_attrs(**attributes))
+
+    def with_notes(self: R, notes: Iterable[str]) -> R:
+        """The same result with notes added."""
+        return self.with_attributes(notes=json.dumps([*self.notes, *notes]))
 
     def to_xarray(self) -> xr.Dataset:
         """The dataset, a copy that may be changed."""

@@ -21,7 +21,7 @@ from copsense.errors import (
     UnknownNameError,
     UnreachablePostureError,
 )
-from copsense.freedom import held_com_axes
+from copsense.freedom import check_com_moves, held_com_axes
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
 from copsense.stance import Stance, check_at_rest, check_stance
 
@@ -103,6 +103,25 @@ class PosturePath:
         known = [k for k in range(len(self)) if k not in self.failures]
         nearest = min(known, key=lambda k: abs(self.values[k] - value), default=i)
         return self.solver(value, self.stances[nearest])
+
+    def reached(self) -> PosturePath:
+        """The part around the middle posture that was reached, as far to one side as the other.
+
+        Raises:
+            UnreachablePostureError: the middle itself was not.
+        """
+        middle = len(self) // 2
+        if middle in self.failures:
+            raise UnreachablePostureError(self.failures[middle])
+        far = min((abs(i - middle) for i in self.failures), default=len(self))
+        part = slice(max(middle - far + 1, 0), middle + far)
+        return replace(
+            self,
+            stances=self.stances[part],
+            values=self.values[part],
+            tangents=self.tangents[part],
+            failures={},
+        )
 
     def shifted(self, by: float) -> PosturePath:
         """The same path with `by` added to its coordinate."""
@@ -215,6 +234,7 @@ def com_sweep(
     where = [finite_number(fixed[n], f"{n} [m]") if n in fixed else None for n in COM_COORDINATES]
     values = _grid(start, stop, count)
     axis = COM_COORDINATES.index(coordinate)
+    check_com_moves(stance, axis)
     solver = _OfCom(stance, (where[0], where[1], where[2]), axis, cost)
     return _sweep(stance, coordinate, "m", values, float(stance.com[axis]), solver, progress)
 

@@ -141,13 +141,15 @@ def made_by(
     stance: Stance,
     criteria: Sequence[Criterion | WrenchPolicy],
     limits: Limits | None,
+    notes: Sequence[str] = (),
 ) -> dict[str, str]:
     """What made the numbers of a result, as attributes of its dataset.
 
     Returns:
         ``criteria``: JSON of `Criterion.to_dict` for each, or ``{"policy": name}``; ``limits``:
         JSON of the limits, ``"null"`` without; ``model_digest``: of the robot and its contacts'
-        frames; ``contacts``: JSON of the contacts; ``notes``: JSON of the robot's notes.
+        frames; ``contacts``: JSON of the contacts; ``notes``: JSON of the robot's notes and of
+        those given.
     """
     return {
         "criteria": json.dumps(
@@ -156,7 +158,7 @@ def made_by(
         "limits": json.dumps(plain(limits)),
         "contacts": json.dumps(plain(stance.contacts)),
         "model_digest": model_digest(stance),
-        "notes": json.dumps(list(stance.robot.notes)),
+        "notes": json.dumps([*stance.robot.notes, *notes]),
     }
 
 

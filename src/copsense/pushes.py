@@ -32,7 +32,7 @@ from copsense.polygon import Polygon
 from copsense.regions.refinement import refine
 from copsense.regions.support_program import SupportProgram
 from copsense.stance import Stance, check_at_rest, check_stance
-from copsense.statics import named_criteria, share_load
+from copsense.statics import named_criteria, share_load, with_tie_breaks
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -129,6 +129,7 @@ class Pushes(ShortRepr):
         limits: what must be respected.
         any: what some equilibrium within the limits can answer.
         criteria: what each criterion answers by its own wrenches, which no QP clips.
+        notes: what to know about it, such as a tie-break that a criterion was given.
     """
 
     stance: Stance
@@ -137,6 +138,7 @@ class Pushes(ShortRepr):
     limits: Limits
     any: PushRegion
     criteria: tuple[PushRegion, ...]
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Own the array."""
@@ -155,6 +157,7 @@ class Pushes(ShortRepr):
             "point": self.point.tolist(),
             "limits": self.limits.to_dict(),
             "regions": {region.name: region.to_dict() for region in self.regions},
+            "notes": list(self.notes),
         }
 
     def plot(self) -> Figure:
@@ -183,7 +186,7 @@ class Pushes(ShortRepr):
 
 def push_limits(
     stance: Stance,
-    frame: str,
+    frame: str | None = None,
     criteria: Sequence[Criterion] = (),
     limits: Limits | None = None,
     *,
@@ -193,7 +196,7 @@ def push_limits(
 
     Args:
         stance: robot, posture and contacts; loads on it stay.
-        frame: name of the frame that is pushed.
+        frame: name of the frame that is pushed; default the robot's base.
         criteria: ways of sharing the load to compare.
         limits: what must be respected; default ``Limits()``: contacts that do not pull or slip,
             centres of pressure in their soles.
@@ -207,13 +210,15 @@ def push_limits(
     """
     check_stance(stance)
     check_at_rest(stance, "a slow push")
-    chosen = named_criteria(criteria, "a comparison of pushes", policies=False)
     robot = stance.robot
+    given = named_criteria(criteria, "a comparison of pushes", policies=False)
+    chosen, tied = with_tie_breaks([stance], given)
     if robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: it cannot be pushed out of it. Use a robot "
             "with a free-floating base."
         )
+    frame = robot.base_frame if frame is None else frame
     within = Limits() if limits is None else limits
     rows, problem = limit_rows(stance, within), LoadProblem.of(stance)
     # What a newton along world x and y takes off the balance.
@@ -228,7 +233,8 @@ def push_limits(
         for criterion in chosen.values()
     )
     best = _any_pushes(robot.weight, rows, problem, slope, torque_slope)
-    return Pushes(stance, frame, read_only(unit[0].points[0].copy()), within, best, own)
+    notes = (*robot.notes, *tied)
+    return Pushes(stance, frame, read_only(unit[0].points[0].copy()), within, best, own, notes)
 
 
 def _any_pushes(

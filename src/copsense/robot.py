@@ -378,6 +378,13 @@ class Robot:
         return tuple(frame.name for frame in self.model.frames)
 
     @cached_property
+    def base_frame(self) -> str:
+        """Name of the link that is the base; of its joint where no link is named."""
+        on_base = [frame for frame in self.model.frames if frame.parentJoint == 1]
+        bodies = [frame for frame in on_base if frame.type == pin.FrameType.BODY]
+        return str((bodies or on_base)[0].name)
+
+    @cached_property
     def position_limits(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """Lowest and highest position of each degree of freedom behind the base (n,) [rad, m].
 

@@ -12,7 +12,12 @@ import numpy as np
 
 from copsense.arrays import check_type
 from copsense.criterion import Criterion
-from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
+from copsense.errors import (
+    CopsenseError,
+    InvalidInputError,
+    UndeterminedWrenchError,
+    UnknownNameError,
+)
 from copsense.extras import require
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
@@ -20,7 +25,14 @@ from copsense.limits import Limits, check_limits
 from copsense.path import PosturePath, check_path
 from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
-from copsense.statics import ConstrainedEquilibrium, WrenchPolicy, named_criteria
+from copsense.stance import Stance
+from copsense.statics import (
+    ConstrainedEquilibrium,
+    WrenchPolicy,
+    named_criteria,
+    tie_break_note,
+    with_tie_break,
+)
 from copsense.sweep_layout import SweepRows, sweep_dataset
 from copsense.sweep_margins import with_limit_margins
 
@@ -296,6 +308,9 @@ def sweep(
             its margins to them in ``limit_margin``.
         progress: called with 1 after each posture.
 
+    A criterion that leaves forces undetermined which contacts exert against each other alone is
+    given a tie-break (`copsense.statics.with_tie_break`), which ``notes`` and ``criteria`` say.
+
     Returns:
         The sweep. A row that failed has NaN and its reason.
 
@@ -307,27 +322,44 @@ def sweep(
     check_path(path)
     if limits is not None:
         check_limits(limits)
-    chosen = named_criteria(criteria, "a sweep")
+    given = named_criteria(criteria, "a sweep")
+    chosen = dict(given)  # a tie-break that one posture needs serves all after it
     _check_policies(chosen, limits)
     rows = SweepRows(path.stances[0], len(path), list(chosen))
     for i, here in enumerate(path.stances):
-        for j, criterion in enumerate(chosen.values()):
+        for j, (name, criterion) in enumerate(chosen.items()):
             if i in path.failures:
                 rows.reason[i, j] = path.failures[i]
                 continue
             try:
-                _fill(rows, (i, j), cop_sensitivity(here, criterion, limits), path.tangents[i])
+                found = _sensitivity(here, criterion, limits)
+                chosen[name] = found.equilibrium.criterion
+                _fill(rows, (i, j), found, path.tangents[i])
             except CopsenseError as error:
                 rows.reason[i, j] = str(error)
         if progress:
             progress(1)
-    dataset = sweep_dataset(path, rows, made_by(path.stances[0], list(chosen.values()), limits))
+    tied = [tie_break_note(name) for name in chosen if chosen[name] != given[name]]
+    made = made_by(path.stances[0], list(chosen.values()), limits, tied)
+    dataset = sweep_dataset(path, rows, made)
     if limits is not None:
         meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
         dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
         if limits.any:
             dataset = with_limit_margins(dataset, limits)
     return Sweep(dataset)
+
+
+def _sensitivity(
+    stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits | None
+) -> CopSensitivity:
+    """The sensitivity, with a tie-break in the criterion where it needs one."""
+    try:
+        return cop_sensitivity(stance, criterion, limits)
+    except UndeterminedWrenchError:
+        if not isinstance(criterion, Criterion):
+            raise
+        return cop_sensitivity(stance, with_tie_break(stance, criterion), limits)
 
 
 def _check_policies(

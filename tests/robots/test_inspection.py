@@ -108,6 +108,21 @@ def test_four_balls_are_points(tmp_path):
     assert run(str(found.line)).code == 0
 
 
+def test_knees_tell_which_way_a_robot_on_points_faces(tmp_path):
+    balls = walker(legs=FOUR).replace('<box size="0.2 0.08 0.02"/>', '<sphere radius="0.02"/>')
+    found = inspect_robot(written(tmp_path, balls))
+    assert found.heading == 0.0
+    assert found.heading_reason.startswith("its knees turn across")
+    rolled = [(name, {"1 0 0": "0 1 0", "0 1 0": "1 0 0"}.get(axis, axis)) for name, axis in FULL]
+    sideways = walker(rolled, legs=FOUR).replace(
+        '<box size="0.2 0.08 0.02"/>', '<sphere radius="0.02"/>'
+    )
+    found = inspect_robot(written(tmp_path, sideways))
+    assert found.heading == 90.0
+    assert "--base-yaw=270" in str(found.line)
+    assert "fl_knee=30" in str(found.line) or "fl_knee=-30" in str(found.line)
+
+
 def test_a_toe_tip_under_a_foot_is_doubted_aloud(tmp_path):
     # A foot of 200 x 80 mm, and a block of 13 x 45 mm that reaches 5 mm lower.
     tip = (

@@ -30,6 +30,7 @@ from copsense.statics import (
     WrenchPolicy,
     named_criteria,
     solve_equilibrium,
+    tie_break_note,
     with_tie_break,
 )
 
@@ -282,10 +283,7 @@ def _determined(
             notes.append(f"{name} is left out: {error}")
             continue
         if tied is not criterion:
-            notes.append(
-                f"{name} leaves forces undetermined that contacts exert against each other; of "
-                "these the least wrench is shown (minimum-wrench with L = 1 m as its tie-break)."
-            )
+            notes.append(tie_break_note(name))
     if not found:
         raise errors[0]
     return found, notes

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_range
 
@@ -92,6 +92,7 @@ def design(
         found = design_criterion(
             path, within, chosen, objective=objective, grid=grid, progress=update
         )
+    echo_notes(note for note in found.notes if note not in stance.robot.notes)
     if picture is not None:
         from copsense.plots import plot_design, save_figure
 

@@ -10,7 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import PICTURES, echo_json, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -128,8 +128,10 @@ def map_command(
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)
+    plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations)
+    echo_notes(note for note in plan.notes if note not in stance.robot.notes)
     if not Path(output).exists():
-        kernel = BatchKernel(stance, chosen)
+        kernel = BatchKernel(stance, plan.criteria)
         if kernel.fallback_reason:
             _note(
                 f"postures are evaluated one at a time, milliseconds each: {kernel.fallback_reason}"
@@ -147,7 +149,7 @@ def map_command(
 
         try:
             store = fill_map(
-                MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations),
+                plan,
                 output,
                 threads=threads,
                 scheduler=scheduler,
@@ -166,7 +168,7 @@ def map_command(
     if plot is not None:
         _draw(stance, summary, plot, pair, marginal, force)
     if as_json:
-        echo_json(summary.to_dict() | {"plot": plot, "notes": list(stance.robot.notes)})
+        echo_json(summary.to_dict() | {"plot": plot, "notes": list(plan.notes)})
     else:
         _print(summary, plot)
     click.get_current_context().exit(1 if _failures(summary) else 0)

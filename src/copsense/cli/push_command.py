@@ -9,19 +9,19 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.load_options import read_point
-from copsense.cli.printing import PICTURES, echo_json, echo_written
+from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.stance_options import read_stance, stance_options
 
 
 @click.command(
     epilog="\b\nExamples:\n"
-    "  copsense push icub --at root_link --plot push.png\n"
+    "  copsense push icub --plot push.png\n"
     "  copsense push icub --at l_hand --limits friction=0.6,torque=model --json\n"
     "  copsense push talos --at torso_2_link --point 0:0:0.2"
 )
 @stance_options
 @criterion_options
-@click.option("--at", "frame", required=True, metavar="FRAME", help="The frame that is pushed.")
+@click.option("--at", "frame", metavar="FRAME", help="The frame that is pushed; default the base.")
 @click.option(
     "--point",
     metavar="X:Y:Z",
@@ -35,7 +35,7 @@ def push(
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,
-    frame: str,
+    frame: str | None,
     point: str | None,
     picture: str | None,
     force: bool,
@@ -58,6 +58,7 @@ def push(
     where = (0.0, 0.0, 0.0) if point is None else read_point(point, "--point")
     stance = read_stance(robot, **options)
     found = push_limits(stance, frame, chosen, within, point=where)
+    echo_notes(note for note in found.notes if note not in stance.robot.notes)
     if picture is not None:
         from copsense.plots import save_figure
 

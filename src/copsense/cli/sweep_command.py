@@ -11,7 +11,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, echo_written, progress_bar
+from copsense.cli.printing import echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_range
 from copsense.errors import InvalidInputError
@@ -104,6 +104,7 @@ def sweep(
     if output is not None:
         swept.save(output, overwrite=force)
     answer = swept.to_dict()
+    echo_notes(note for note in swept.notes if note not in path.stances[0].robot.notes)
     if as_json:
         echo_json(answer | {"output": output})
     else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from copsense._version import __version__
@@ -16,7 +16,7 @@ from copsense.limits import Limits, optional_limits
 from copsense.maps.sampling import Sample, Sampling
 from copsense.provenance import model_digest, plain
 from copsense.stance import Stance, check_at_rest, check_stance
-from copsense.statics import named_criteria
+from copsense.statics import named_criteria, with_tie_breaks
 
 FORMAT = 2  # of the store; counted up when what is written changes
 
@@ -32,6 +32,7 @@ class MapPlan(ShortRepr):
         limits: what the wrenches must respect, or None.
         chunk: postures of a chunk, the unit that is written and resumed.
         configurations: whether the configurations are stored too.
+        notes: what to know about robot and criteria, such as a tie-break that one was given.
     """
 
     stance: Stance
@@ -40,14 +41,17 @@ class MapPlan(ShortRepr):
     limits: Limits | None = None
     chunk: int = 4096
     configurations: bool = False
+    notes: tuple[str, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
         """Validate the criteria and the size of a chunk."""
         check_stance(self.stance)
         check_at_rest(self.stance, "a map")
         object.__setattr__(self, "limits", optional_limits(self.limits))
-        given = tuple(named_criteria(self.criteria, "a map").values())
-        object.__setattr__(self, "criteria", given)
+        given = named_criteria(self.criteria, "a map")
+        chosen, notes = with_tie_breaks([self.stance], given)
+        object.__setattr__(self, "criteria", tuple(chosen.values()))
+        object.__setattr__(self, "notes", (*self.stance.robot.notes, *notes))
         for criterion in self.criteria:
             if not isinstance(criterion, Criterion):
                 raise InvalidInputError(

@@ -11,6 +11,7 @@ from copsense.robots.feet import Foot
 
 _PLAIN = 1.5  # an axis says what is up when it is so much longer than the base's z
 _CLEAR = 0.4  # of the limbs' reach: how far off their ends' middle has to be to say what is up
+_PARALLEL = 0.9  # cosine from which axes count as parallel
 _AHEAD = 0.05  # of its length: a sole set off less from its ankle does not say where ahead is
 _TURNS = {  # axis of the base that is up -> roll, pitch, yaw [deg] that turn it there
     (0, 1): (0.0, -90.0, 0.0),
@@ -53,13 +54,20 @@ def facing(
 ) -> tuple[float | None, str]:
     """Heading [deg, counter-clockwise from the world's x] at a configuration, and how it is known.
 
-    None where nothing says it. Feet stand beside each other, and soles reach ahead of the ankles.
+    None where nothing says it. Feet stand beside each other, soles reach ahead of the ankles, and
+    knees turn about the axis from side to side.
     """
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
     soles = [foot for foot in feet if foot.sole is not None]
     if not soles:
-        return None, "its feet have no soles to tell by"
+        left = _knees_axis(robot, q, feet)
+        if left is None:
+            return None, "its feet have no soles to tell by, and its knees no axis in common"
+        ahead = np.array([left[1], -left[0]])
+        # Forward rather than backward, left rather than right.
+        ahead = ahead if ahead @ (1.0, 0.1) > 0 else -ahead
+        return _quarter(ahead), "its knees turn across; nothing tells ahead from behind"
     ahead = np.mean([(f.middle - data.oMi[f.joint].translation)[:2] for f in soles], axis=0)
     plain = _AHEAD * max(max(foot.sole.size) for foot in soles if foot.sole is not None)
     why = "its soles reach ahead of the ankles"
@@ -74,8 +82,28 @@ def facing(
             why = "its feet stand beside each other; its soles do not tell ahead from behind"
     elif np.linalg.norm(ahead) < plain:
         return None, "its soles reach as far behind the ankles as ahead of them"
+    return _quarter(ahead), why
+
+
+def _quarter(ahead: Float[np.ndarray, " 2"]) -> float:
+    """A horizontal direction's heading [deg], to the nearest quarter turn."""
     angle = np.degrees(np.arctan2(ahead[1], ahead[0]))
-    return float(np.round(angle / 90.0) * 90.0) % 360.0, why
+    return float(np.round(angle / 90.0) * 90.0) % 360.0
+
+
+def _knees_axis(
+    robot: Robot, q: Float[np.ndarray, " nq"], feet: tuple[Foot, ...]
+) -> Float[np.ndarray, " 3"] | None:
+    """The horizontal axis about which the last joint of every leg turns, or None."""
+    axes = []
+    for foot in feet:
+        turning = [a for a in (_turning_axis(robot, q, i) for i in _limb(robot, foot)) if any(a)]
+        if not turning:
+            return None
+        axes.append(turning[-1])
+    if not axes or min(abs(float(axes[0] @ axis)) for axis in axes) < _PARALLEL:
+        return None
+    return axes[0] if abs(axes[0][2]) < 1.0 - _PARALLEL else None
 
 
 def straight_legs(
@@ -121,7 +149,7 @@ def _pitch_joints(
     robot: Robot, q: Float[np.ndarray, " nq"], foot: Foot, heading: float
 ) -> list[str] | None:
     """The last joints of a leg that turn about the lateral axis: hip, knee (and ankle)."""
-    names = [robot.model.names[i] for i in robot.model.supports[foot.joint] if i > 1]
+    names = [robot.model.names[i] for i in _limb(robot, foot)]
     pitch = [name for name in names if abs(_axis(robot, q, name, heading)) > 0.8]
     need = 3 if foot.kind == "surface" else 2
     return pitch[-need:] if len(pitch) >= need else None
@@ -129,15 +157,28 @@ def _pitch_joints(
 
 def _axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:
     """Part of a joint's axis along the robot's left; zero for a joint of another kind."""
-    i = robot.model.getJointId(joint)
-    if robot.model.joints[i].nv != 1 or robot.joint_unit(joint) != "rad":
-        return 0.0
-    data = robot.model.createData()
-    jacobian = pin.computeJointJacobian(robot.model, data, q, i)
-    pin.forwardKinematics(robot.model, data, q)
-    turn = data.oMi[i].rotation @ jacobian[3:, robot.model.joints[i].idx_v]
+    turn = _turning_axis(robot, q, robot.model.getJointId(joint))
     left = np.array([-np.sin(np.radians(heading)), np.cos(np.radians(heading)), 0.0])
     return float(turn @ left)
+
+
+def _turning_axis(
+    robot: Robot, q: Float[np.ndarray, " nq"], joint: int
+) -> Float[np.ndarray, " 3"]:
+    """World axis about which a joint turns; zero for a joint of another kind."""
+    if robot.model.joints[joint].nv != 1 or robot.joint_unit(robot.model.names[joint]) != "rad":
+        return np.zeros(3)
+    data = robot.model.createData()
+    jacobian = pin.computeJointJacobian(robot.model, data, q, joint)
+    pin.forwardKinematics(robot.model, data, q)
+    return np.asarray(
+        data.oMi[joint].rotation @ jacobian[3:, robot.model.joints[joint].idx_v]
+    )
+
+
+def _limb(robot: Robot, foot: Foot) -> list[int]:
+    """The joints from the base to a foot."""
+    return [i for i in robot.model.supports[foot.joint] if i > 1]
 
 
 def _sign(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:

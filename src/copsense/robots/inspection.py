@@ -100,6 +100,7 @@ class Inspection(ShortRepr):
             {
                 "name": robot.name,
                 "mass": robot.mass,
+                "base": robot.base_frame,
                 "gravity": robot.model.gravity.linear.tolist(),
                 "joints": [vars(joint) for joint in self.joints],
                 "motors": list(robot.torque_names),
@@ -131,7 +132,7 @@ class Inspection(ShortRepr):
         width = max((len(joint.name) for joint in self.joints), default=0)
         lines = [
             f"{robot.name}: {robot.mass:.4g} kg, gravity ({gravity}) m/s^2, "
-            f"{len(self.joints)} joints, {len(robot.torque_names)} motors",
+            f"{len(self.joints)} joints, {len(robot.torque_names)} motors, base {robot.base_frame}",
             *(f"  {joint.name:{width}}  {joint}" for joint in self.joints),
             *(f"  loop {loop.name} ({loop.kind})" for loop in robot.drives.loops),
             "lowest at rest:" if self.feet else "lowest at rest: nothing was found",

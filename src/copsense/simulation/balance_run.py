@@ -27,6 +27,7 @@ from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.stance import Stance, check_stance
+from copsense.statics import with_tie_breaks
 
 
 def balance(
@@ -88,6 +89,10 @@ def balance(
     signal = scenario.reference
     path = signal if isinstance(signal, PathReference) else lateral_reference(stance, signal)
     predicted = criterion if controller is not None else criterion or minimum_torque()
+    notes: tuple[str, ...] = ()
+    if predicted is not None:
+        tied, notes = with_tie_breaks([stance], {predicted.name: predicted})
+        (predicted,) = (c for c in tied.values() if isinstance(c, Criterion))
     if controller is None:
         assert predicted is not None
         controller = BalancingController(stance, predicted, gains, limits=limits)
@@ -101,6 +106,7 @@ def balance(
         progress=progress,
         stop=stop,
     )
+    recording = recording.with_notes(notes)
     return recording if prediction is None else prediction.attach(recording)
 
 

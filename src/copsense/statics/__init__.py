@@ -21,9 +21,9 @@ from copsense.statics.equilibrium import (
     is_admissible,
     share_load,
     solve_static,
-    with_tie_break,
 )
 from copsense.statics.policy import WrenchPolicy, named_criteria, policy_name, wrench_policy
+from copsense.statics.tie_breaks import tie_break_note, with_tie_break, with_tie_breaks
 
 __all__ = [
     "PROJECT",
@@ -40,7 +40,9 @@ __all__ = [
     "policy_name",
     "share_load",
     "solve_equilibrium",
+    "tie_break_note",
     "with_tie_break",
+    "with_tie_breaks",
     "wrench_policy",
 ]
 

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
-from copsense.criterion import Criterion, minimum_wrench
-from copsense.errors import InvalidInputError, UnbalancedError, UndeterminedWrenchError
+from copsense.criterion import Criterion
+from copsense.errors import InvalidInputError, UnbalancedError
 from copsense.load_problem import LoadProblem
 from copsense.robot import Robot
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
 from copsense.statics.policy import BALANCE, WrenchPolicy, policy_forces, policy_name
 
-INTERNAL = 1e-8  # of J' f, for f of length one, under which no joint feels forces
 UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
 PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
 
@@ -179,28 +178,6 @@ def solve_static(stance: Stance, criterion: Criterion | WrenchPolicy) -> StaticE
     system = Kkt(stance, criterion)
     forces, torques, nu = _balanced(system, criterion, system.problem)
     return StaticEquilibrium(stance, criterion, forces, torques, nu, _system=system)
-
-
-def with_tie_break(stance: Stance, criterion: Criterion) -> Criterion:
-    """The criterion, with ``minimum_wrench(1.0)`` as its tie-break where it needs one.
-
-    It needs one where contacts can push against each other without moving anything (heel and toe
-    of one foot, four points under it): such forces cost nothing that the criterion weighs.
-
-    Raises:
-        UndeterminedWrenchError: more than such internal forces is undetermined.
-        InvalidInputError: weights that do not fit.
-    """
-    try:
-        Kkt(stance, criterion)
-    except UndeterminedWrenchError as error:
-        tied = replace(criterion, tie_break=minimum_wrench(1.0))
-        free = Kkt(stance, tied).free
-        felt = np.abs(stance.constraints.T @ free).max(initial=0.0)
-        if criterion.tie_break is not None or felt > INTERNAL:
-            raise error
-        return tied
-    return criterion
 
 
 def share_load(

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from support.stances import postures
+from support.walkers import BIPED, FULL, NO_ANKLE_ROLL, PITCH_ONLY, bent, walker
 
 import copsense
 from copsense.batch import PostureChart, coordinate_names, evaluate_batch
@@ -346,3 +347,53 @@ def test_an_absurd_row_is_a_row_and_takes_no_other_with_it(case):
     assert list(batch.converged) == [False, True, False]
     assert np.isnan(batch.configurations[[0, 2]]).all()
     assert all(reason.startswith("unreachable") for reason in batch.reasons[[0, 2]])
+
+
+def sliding(leg):
+    """A walker with a mass that slides sideways over its trunk."""
+    mass = (
+        '<link name="slide"><inertial><mass value="6"/><inertia ixx="0.02" iyy="0.02" izz="0.02" '
+        'ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="slider" type="prismatic">'
+        '<parent link="trunk"/><child link="slide"/><axis xyz="0 1 0"/><origin xyz="0 0 0.3"/>'
+        '<limit lower="-0.3" upper="0.3" effort="80" velocity="5"/></joint></robot>'
+    )
+    return copsense.load_stance(
+        walker(leg).replace("</robot>", mass),
+        contacts=BIPED,
+        contact_at="sole",
+        posture=bent(),
+    )
+
+
+@pytest.mark.parametrize("leg", [NO_ANKLE_ROLL, PITCH_ONLY], ids=["five", "three"])
+def test_where_the_legs_cannot_move_the_com_the_other_joints_do(leg):
+    stance = sliding(leg)
+    chart = PostureChart(stance, ["com_y"])
+    values = np.linspace(-0.02, 0.02, 5)[:, None]
+    found = chart.solve(values)
+    assert found.converged.all(), found.reasons
+    slid = [stance.robot.joint_position(q, "slider") for q in found.configurations]
+    # The legs hold the trunk: the CoM goes where the sliding mass goes.
+    assert slid == pytest.approx(values[:, 0] * stance.robot.mass / 6.0, abs=1e-9)
+    # There the legs still hold what they held: no posture is all but singular.
+    assert [stance.at(q).rank for q in found.configurations] == [stance.rank] * 5
+
+
+def test_legs_that_can_move_the_com_leave_the_other_joints_alone():
+    stance = sliding(FULL)
+    chart = PostureChart(stance, ["com_y"])
+    found = chart.solve([[0.02]])
+    assert stance.robot.joint_position(found.configurations[0], "slider") == 0.0
+
+
+def test_a_stance_beyond_a_joint_limit_is_a_posture_of_its_chart(icub):
+    home = icub.robot.joint_position(icub.q, "l_elbow")
+    urdf = icub.robot.model.copy()
+    urdf.upperPositionLimit[urdf.joints[urdf.getJointId("l_elbow")].idx_q] = home - 1e-5
+    robot = copsense.Robot.from_model(urdf)
+    stance = copsense.Stance(robot, icub.q, icub.contacts)
+    chart = PostureChart(stance, ["com_y", "l_elbow"])
+    at = float(chart.values[0])
+    found = chart.solve([[at + 0.01, home], [at + 0.01, home + 1e-3]])
+    assert found.converged.tolist() == [True, False]
+    assert "l_elbow over its limit by 0.001 rad" in found.reasons[1]

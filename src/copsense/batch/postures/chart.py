@@ -95,6 +95,8 @@ class PostureChart:
         self._joints, self._rows_named = joint_units(stance), row_units(stance, self._coordinates)
         self._code: Callable[..., None] | None = None
         self.fallback_reason = why_not_covered(stance)
+        if not self.fallback_reason and stance.false_motions.shape[1]:
+            self.fallback_reason = "the contacts hold a motion to second order only"
         if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
             self.fallback_reason = "the model's root is not the world"
         if not self.fallback_reason:

@@ -27,6 +27,7 @@ FOOT = ("x", "y", "yaw")
 _WAYS = ("along x", "along y", "along z", "about x", "about y", "about z")
 _UNITS: tuple[Unit, ...] = ("m", "m", "m", "rad", "rad", "rad")
 _STEEP = 0.2  # least vertical part of a plane's normal for a foot to be moved on it
+_SINGULAR = 1e-6  # of the largest: singular values under it move nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +61,8 @@ class Coordinates(ShortRepr):
         positions: origin of each contact (nc, 3) [m].
         rotations: axes of each contact, as columns (nc, 3, 3).
         slopes: how its plane rises along world x and y (nc, 2).
-        low: lower limit of each joint velocity's position, minus infinity where it has none.
+        low: lower limit of each joint velocity's position, minus infinity where it has none; the
+            stance's own position where that is beyond.
         high: upper limit.
     """
 
@@ -127,6 +129,12 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
     limbs = _limbs(stance, {int(p) for p in place}, com_axes)
     unknowns = {u for limb in limbs for u in limb.unknowns}
     low, high = stance.robot.position_limits
+    own = np.array(
+        [
+            stance.robot.joint_position(stance.q, name) if _one(stance, name) else 0.0
+            for name, _ in joint_units(stance)
+        ]
+    )
     normals = _normals(stance)
     level = normals[:, 2] > _STEEP
     slopes = np.where(
@@ -143,8 +151,9 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
         np.array([p.translation for p in stance.placements]),
         np.array([p.rotation for p in stance.placements]),
         slopes,
-        low,
-        high,
+        # Where the stance stands is allowed: whoever made it has heard of it.
+        np.minimum(low, own),
+        np.maximum(high, own),
     )
 
 
@@ -248,5 +257,21 @@ def _limbs(stance: Stance, named: set[int], com_axes: tuple[int, ...]) -> tuple[
         base = set(com_axes)
     if base or com_axes:
         everything = set().union(base, *(limb[1] for limb in limbs))
+        rest = set(range(nb, stance.robot.model.nv)) - named
+        # Where limbs and base cannot do it alone, the other joints take part.
+        if _reach(stance, com_axes, everything) != _reach(stance, com_axes, everything | rest):
+            everything |= rest
         return (Limb(tuple(range(len(stance.contacts))), tuple(sorted(everything))),)
     return tuple(Limb(tuple(sorted(c)), tuple(sorted(u))) for c, u in limbs)
+
+
+def _reach(stance: Stance, com_axes: tuple[int, ...], columns: set[int]) -> tuple[int, int]:
+    """In how many directions some velocities move the contacts, and the CoM with them in place."""
+    others = sorted(set(range(stance.robot.model.nv)) - columns)
+    _, s, vt = np.linalg.svd(stance.admissible_motions[others])  # true motions, not false ones
+    motions = stance.admissible_motions @ vt[int(np.sum(s > _SINGULAR)) :].T
+    J, com = stance.jacobian[:, sorted(columns)], stance.com_jacobian[list(com_axes)] @ motions
+    tolerance = _SINGULAR * np.linalg.norm(stance.jacobian, 2)
+    return int(np.linalg.matrix_rank(J, tol=tolerance)), int(
+        np.linalg.matrix_rank(com, tol=_SINGULAR)
+    )

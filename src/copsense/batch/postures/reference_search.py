@@ -29,7 +29,7 @@ from copsense.batch.postures.search_settings import (
     UNSOLVED,
 )
 from copsense.content import ShortRepr
-from copsense.stance import Stance
+from copsense.stance import RANK_TOLERANCE, Stance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,11 +70,12 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
         placed = given[: model.nv].copy()
         here = stance.at(q, check=False)
         h, opposite = _errors(here, plan, given)
+        folded = float(np.abs(here.fold_equations[1]).max(initial=0.0))
         sizes = np.abs(h)
         worst = max(float(sizes.max()), float(opposite))
         which = int(sizes.argmax())
         hopeless = steps % PATIENCE == 0 and steps > 0 and worst > PROGRESS * before
-        if worst < TOLERANCE:
+        if worst < TOLERANCE and folded < TOLERANCE:
             status, joint, excess = _within(here, plan)
             return Attempt(here.q, worst, steps, status, joint, excess)
         if steps >= MOST_STEPS or hopeless:
@@ -93,6 +94,17 @@ def _advance(here: Stance, plan: Coordinates, given: np.ndarray, h: np.ndarray) 
         J = _jacobian(here, plan, given, limb)
         e = h[first : first + len(J)]
         first += len(J)
+        rows, errors = here.fold_equations
+        if len(rows):
+            # Motions that the contacts hold to second order are asked for as what they are: else
+            # Newton only halves the error in them, and ends where J is all but deficient.
+            rows = rows.copy()
+            rows[:, : here.robot.base_nv] = rows[:, : here.robot.base_nv] @ _base_rates(here, given)
+            J = np.vstack([J, rows[:, list(limb.unknowns)]])
+            step = -np.linalg.lstsq(J, np.concatenate([e, errors]), rcond=RANK_TOLERANCE)[0]
+            longest = float(np.abs(step).max(initial=0.0))
+            given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
+            continue
         # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
         M = J @ J.T
         mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
@@ -172,6 +184,7 @@ def _errors(here: Stance, plan: Coordinates, given: np.ndarray) -> tuple[np.ndar
 def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) -> np.ndarray:
     """dh/dx of a limb."""
     nb, blocks = here.robot.base_nv, []
+    B = _base_rates(here, given)
     for k in limb.contacts:
         contact, place = here.contacts[k], here.placements[k]
         rows = here.jacobian[here.rows[k]]
@@ -181,9 +194,14 @@ def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) ->
             blocks.append(rows)
     blocks.append(here.com_jacobian[list(plan.com_axes)])
     J = np.vstack(blocks)
-    # Columns of the base: along its coordinates instead of its own velocity.
-    B = np.eye(nb)
-    if nb == 6:
+    J[:, :nb] = J[:, :nb] @ B
+    return J[:, list(limb.unknowns)]
+
+
+def _base_rates(here: Stance, given: np.ndarray) -> np.ndarray:
+    """Velocity of the base in its own frame per rate of its coordinates."""
+    B = np.eye(here.robot.base_nv)
+    if here.robot.base_nv == 6:
         turn = pin.rpy.rpyToMatrix(*given[3:6])
         B[:3, :3] = turn.T
         B[3:, 3:] = turn.T @ pin.rpy.computeRpyJacobian(
@@ -192,5 +210,4 @@ def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) ->
     else:
         c, s = np.cos(given[2]), np.sin(given[2])
         B[:2, :2] = [[c, s], [-s, c]]
-    J[:, :nb] = J[:, :nb] @ B
-    return J[:, list(limb.unknowns)]
+    return B
