@@ -23,7 +23,8 @@ from pathlib import Path
 DATA = "example-robot-data"
 ROBOTS = (
     (DATA, "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf"),
-    (DATA, "simple_humanoid_description/urdf/simple_humanoid.urdf"),
+    (DATA, "a1_description/urdf/a1.urdf"),
+    (DATA, "go1_description/urdf/go1.urdf"),
     (DATA, "hyq_description/robots/hyq_no_sensors.urdf"),
     (DATA, "b1_description/urdf/b1.urdf"),
     (DATA, "bolt_description/robots/bolt.urdf"),
@@ -35,6 +36,7 @@ ROBOTS = (
     ("dm_control", "dm_control/suite/quadruped.xml"),
     ("robosuite", "robosuite/models/assets/robots/gr1/robot.xml"),
     ("robosuite_models", "robosuite_models/assets/robots/h1/robot.xml"),
+    ("robosuite_models", "robosuite_models/assets/robots/g1/robot.xml"),
 )
 COMMANDS = {
     "analyse": "",

@@ -83,9 +83,7 @@ def test_legs_without_ankle_roll_go_through_the_commands(tmp_path):
         for joint, angle in bent().items()
         for word in ("--posture", f"{joint}={np.degrees(angle)}")
     ]
-    stance = copsense.load_stance(
-        str(robot), contacts=BIPED, contact_at="sole", posture=bent()
-    )
+    stance = copsense.load_stance(str(robot), contacts=BIPED, contact_at="sole", posture=bent())
     swept = command("sweep", *line, "--com-x=-5mm:5mm:3", "--json")
     assert swept.code == 0, swept.err
     assert NOTE in json.loads(swept.out)["notes"]

@@ -203,7 +203,7 @@ def design_criterion(
     # What only the torques choose may leave forces that contacts exert against each other.
     usual = {c.name: c for c in (minimum_wrench(1.0), minimum_torque())}
     tied, notes = with_tie_breaks(path.stances, usual)
-    both = tuple(c for c in tied.values() if isinstance(c, Criterion))
+    both = tuple(tied.values())
     if notes:
         family = replace(family, build=partial(_tied, family.build))
     reach = min(score(path, limits, criterion, {}).travel for criterion in both)

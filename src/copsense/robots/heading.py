@@ -12,6 +12,7 @@ from copsense.robots.feet import Foot
 _PLAIN = 1.5  # an axis says what is up when it is so much longer than the base's z
 _CLEAR = 0.4  # of the limbs' reach: how far off their ends' middle has to be to say what is up
 _PARALLEL = 0.9  # cosine from which axes count as parallel
+_PLAINLY = 0.5  # joints more about one horizontal axis than about the other
 _AHEAD = 0.05  # of its length: a sole set off less from its ankle does not say where ahead is
 _TURNS = {  # axis of the base that is up -> roll, pitch, yaw [deg] that turn it there
     (0, 1): (0.0, -90.0, 0.0),
@@ -93,17 +94,18 @@ def _quarter(ahead: Float[np.ndarray, " 2"]) -> float:
 
 def _knees_axis(
     robot: Robot, q: Float[np.ndarray, " nq"], feet: tuple[Foot, ...]
-) -> Float[np.ndarray, " 3"] | None:
-    """The horizontal axis about which the last joint of every leg turns, or None."""
+) -> Float[np.ndarray, " 2"] | None:
+    """The horizontal axis about which most joints of every leg turn, or None."""
     axes = []
     for foot in feet:
-        turning = [a for a in (_turning_axis(robot, q, i) for i in _limb(robot, foot)) if any(a)]
-        if not turning:
+        turning = np.array([_turning_axis(robot, q, i)[:2] for i in _limb(robot, foot)])
+        counts, directions = np.linalg.eigh(turning.reshape(-1, 2).T @ turning.reshape(-1, 2))
+        if counts[1] - counts[0] < _PLAINLY:
             return None
-        axes.append(turning[-1])
+        axes.append(directions[:, 1])
     if not axes or min(abs(float(axes[0] @ axis)) for axis in axes) < _PARALLEL:
         return None
-    return axes[0] if abs(axes[0][2]) < 1.0 - _PARALLEL else None
+    return np.asarray(axes[0])
 
 
 def straight_legs(
@@ -162,18 +164,14 @@ def _axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float)
     return float(turn @ left)
 
 
-def _turning_axis(
-    robot: Robot, q: Float[np.ndarray, " nq"], joint: int
-) -> Float[np.ndarray, " 3"]:
+def _turning_axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: int) -> Float[np.ndarray, " 3"]:
     """World axis about which a joint turns; zero for a joint of another kind."""
     if robot.model.joints[joint].nv != 1 or robot.joint_unit(robot.model.names[joint]) != "rad":
         return np.zeros(3)
     data = robot.model.createData()
     jacobian = pin.computeJointJacobian(robot.model, data, q, joint)
     pin.forwardKinematics(robot.model, data, q)
-    return np.asarray(
-        data.oMi[joint].rotation @ jacobian[3:, robot.model.joints[joint].idx_v]
-    )
+    return np.asarray(data.oMi[joint].rotation @ jacobian[3:, robot.model.joints[joint].idx_v])
 
 
 def _limb(robot: Robot, foot: Foot) -> list[int]:

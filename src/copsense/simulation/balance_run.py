@@ -92,7 +92,7 @@ def balance(
     notes: tuple[str, ...] = ()
     if predicted is not None:
         tied, notes = with_tie_breaks([stance], {predicted.name: predicted})
-        (predicted,) = (c for c in tied.values() if isinstance(c, Criterion))
+        (predicted,) = tied.values()
     if controller is None:
         assert predicted is not None
         controller = BalancingController(stance, predicted, gains, limits=limits)

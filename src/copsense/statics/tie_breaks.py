@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from copsense.errors import UndeterminedWrenchError
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
 from copsense.statics.policy import WrenchPolicy
+
+C = TypeVar("C", Criterion, Criterion | WrenchPolicy)
 
 _INTERNAL = 1e-8  # of J' f, for f of length one, under which no joint feels forces
 
@@ -40,8 +43,8 @@ def with_tie_break(stance: Stance, criterion: Criterion) -> Criterion:
 
 
 def with_tie_breaks(
-    stances: Iterable[Stance], criteria: Mapping[str, Criterion | WrenchPolicy]
-) -> tuple[dict[str, Criterion | WrenchPolicy], tuple[str, ...]]:
+    stances: Iterable[Stance], criteria: Mapping[str, C]
+) -> tuple[dict[str, C], tuple[str, ...]]:
     """Criteria with the tie-breaks that they need at any of some stances, and what to say of them.
 
     One that stays undetermined even so is left as it is: whoever solves for it says why.

@@ -60,6 +60,7 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
     given[plan.place] = values
     for axis in plan.com_axes if nb == 6 else ():  # the base goes where the CoM goes
         given[axis] += given[model.nv + axis] - plan.given[model.nv + axis]
+    folds = stance.false_motions.shape[1] > 0
     q, placed = stance.q, plan.given[: model.nv]  # where q stands
     before, steps = np.inf, 0
     worst, which = np.inf, 0
@@ -70,7 +71,10 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
         placed = given[: model.nv].copy()
         here = stance.at(q, check=False)
         h, opposite = _errors(here, plan, given)
-        folded = float(np.abs(here.fold_equations[1]).max(initial=0.0))
+        if folds and not np.isfinite(here.jacobian).all():
+            return Attempt(q, worst, steps, STUCK, which, 0.0)
+        fold = here.fold_equations if folds else None
+        folded = 0.0 if fold is None else float(np.abs(fold[1]).max(initial=0.0))
         sizes = np.abs(h)
         worst = max(float(sizes.max()), float(opposite))
         which = int(sizes.argmax())
@@ -83,22 +87,27 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
             return Attempt(here.q, worst, steps, status, which, 0.0)
         before = worst if steps % PATIENCE == 0 else before
         with np.errstate(over="ignore", invalid="ignore"):
-            _advance(here, plan, given, h)
+            _advance(here, plan, given, h, fold)
         steps += 1
 
 
-def _advance(here: Stance, plan: Coordinates, given: np.ndarray, h: np.ndarray) -> None:
+def _advance(
+    here: Stance,
+    plan: Coordinates,
+    given: np.ndarray,
+    h: np.ndarray,
+    fold: tuple[np.ndarray, np.ndarray] | None,
+) -> None:
     """Take one step of every limb's unknowns."""
     first = 0
     for limb in plan.limbs:
         J = _jacobian(here, plan, given, limb)
         e = h[first : first + len(J)]
         first += len(J)
-        rows, errors = here.fold_equations
-        if len(rows):
+        if fold is not None and len(fold[0]):
             # Motions that the contacts hold to second order are asked for as what they are: else
             # Newton only halves the error in them, and ends where J is all but deficient.
-            rows = rows.copy()
+            rows, errors = np.array(fold[0]), fold[1]
             rows[:, : here.robot.base_nv] = rows[:, : here.robot.base_nv] @ _base_rates(here, given)
             J = np.vstack([J, rows[:, list(limb.unknowns)]])
             step = -np.linalg.lstsq(J, np.concatenate([e, errors]), rcond=RANK_TOLERANCE)[0]
