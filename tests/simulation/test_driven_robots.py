@@ -141,3 +141,15 @@ def test_a_rope_pulls_where_the_hand_has_gone():
     force = data.xfrc_applied[:, :3].sum(axis=0)
     assert np.abs(force - moved.applied.wrenches[:, :3].sum(axis=0)).max() < 1e-9
     assert np.abs(moved.applied.wrenches - stance.applied.wrenches).max() > 1e-6
+
+
+def test_loads_follow_their_links_between_two_commands_too():
+    stance = CASES["loads"]()
+    one, many = MujocoSimulator(stance), MujocoSimulator(stance)
+    limp = np.zeros(len(stance.robot.torque_names))
+    for _ in range(8):
+        stepped = one.step(limp)
+    repeated = many.repeat(limp, 8)
+    assert repeated.time == stepped.time
+    np.testing.assert_array_equal(repeated.q, stepped.q)
+    np.testing.assert_array_equal(repeated.wrenches, stepped.wrenches)

@@ -15,7 +15,7 @@ from copsense.controllers import (
     lateral_reference,
     public_gains,
 )
-from copsense.simulation import MujocoSimulator, Push, Scenario, rollout
+from copsense.simulation import Motors, MujocoSimulator, Push, Scenario, rollout
 from copsense.simulation.prediction import predict, predict_lean
 
 
@@ -116,6 +116,45 @@ def test_a_push_is_an_impulse():
     recording = rollout(simulator(), BalancingController(icub(), C2), scenario, record_period=1e-3)
     velocity = float(recording["com_velocity"].sel(com_axis="y")[-1])
     assert velocity == pytest.approx(push.impulse / icub().robot.mass, rel=0.15)
+
+
+class Stepwise:
+    """A simulator that can only step, with the steps counted."""
+
+    def __init__(self, inner):
+        self.inner, self.stance, self.time_step, self.steps = (
+            inner, inner.stance, inner.time_step, 0,
+        )  # fmt: skip
+        self.reset = inner.reset
+
+    def step(self, torques, external=None):
+        self.steps += 1
+        return self.inner.step(torques, external)
+
+
+class Repeating(Stepwise):
+    """A simulator that repeats, its single steps counted."""
+
+    def repeat(self, torques, steps):
+        return self.inner.repeat(torques, steps)
+
+
+@pytest.mark.parametrize(
+    ("changes", "single"),
+    [
+        ({}, 0),
+        # The push acts in 13 periods of four steps, in the first and the last in part.
+        ({"pushes": (Push((0.0, 30.0, 0.0), start=0.0513, duration=0.045),)}, 52),
+        ({"motors": Motors(delay=1e-3)}, 200),
+    ],
+    ids=["undisturbed", "pushed", "delayed"],
+)
+def test_steps_at_once_are_the_same_steps(changes, single):
+    scenario = Scenario(0.2, Sine(0.01, 0.5), control_period=4e-3, **changes)
+    one, many = Stepwise(simulator()), Repeating(simulator())
+    runs = [rollout(s, BalancingController(icub(), C2), scenario) for s in (one, many)]
+    assert runs[0].to_xarray().equals(runs[1].to_xarray())
+    assert (one.steps, many.steps) == (200, single)
 
 
 def test_the_public_gains_stand_too():

@@ -11,6 +11,7 @@ from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.simulation.simulator import (
     AlterableSimulator,
+    RepeatingSimulator,
     Simulator,
     SimulatorStoppedError,
     Snapshot,
@@ -28,6 +29,7 @@ __all__ = [
     "PhysicsSettings",
     "Push",
     "Recording",
+    "RepeatingSimulator",
     "Scenario",
     "Simulator",
     "SimulatorStoppedError",

@@ -14,7 +14,11 @@ from copsense.simulation.disturbance import Motors
 
 
 class Actuation:
-    """The motors of one run; before the start, the first command counts as already given."""
+    """The motors of one run; before the start, the first command counts as already given.
+
+    Attributes:
+        plain: whether every command is applied as it is, at once.
+    """
 
     def __init__(self, motors: Motors, robot: Robot, time_step: float) -> None:
         """Prepare the delay line.
@@ -37,13 +41,13 @@ class Actuation:
             if motors.bandwidth is None
             else math.exp(-2.0 * math.pi * motors.bandwidth * time_step)
         )
-        self._shaped = bool(self._delay or self._limited or self._keep)
+        self.plain: bool = not (self._delay or self._limited or self._keep)
         self._line: deque[np.ndarray] = deque()
         self._applied: np.ndarray | None = None
 
     def apply(self, command: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """The torques of the next physics step; to be called once for each."""
-        if not self._shaped:
+        if self.plain:
             return command
         if self._applied is None:
             self._line.extend([command] * self._delay)

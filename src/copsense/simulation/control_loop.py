@@ -27,6 +27,7 @@ from copsense.simulation.scenario import Scenario
 from copsense.simulation.sensors import Sensors
 from copsense.simulation.simulator import (
     AlterableSimulator,
+    RepeatingSimulator,
     Simulator,
     SimulatorStoppedError,
 )
@@ -118,6 +119,12 @@ def _run(
     ground = _alterable(simulator, "a change of friction") if changes else None
     stance, robot = simulator.stance, simulator.stance.robot
     actuation = Actuation(scenario.motors, robot, dt)
+    # Where nothing acts between two commands, the states between them are not needed.
+    repeating = (
+        simulator
+        if steps > 1 and actuation.plain and isinstance(simulator, RepeatingSimulator)
+        else None
+    )
     sensors, pushes = Sensors(scenario, believed), PushForces(scenario, stance, dt)
     watch, recorder = EventDetector(stance, thresholds), Recorder(stance)
     every = max(1, round(record_period / scenario.control_period))
@@ -147,9 +154,13 @@ def _run(
             observation = _shown(time, q, v, target, now.wrenches)
             command = ask(controller, observation, n)
             here = now
-            for _ in range(steps):
+            if repeating is not None and pushes.rest(now.time, scenario.control_period):
                 torques = actuation.apply(command.torques)
-                now = simulator.step(torques, pushes.at(now))
+                now = repeating.repeat(torques, steps)
+            else:
+                for _ in range(steps):
+                    torques = actuation.apply(command.torques)
+                    now = simulator.step(torques, pushes.at(now))
             if not (is_finite(now.q) and is_finite(now.v)):
                 now = here
                 raise SimulatorStoppedError("the motion is no longer finite", time)

@@ -128,22 +128,41 @@ class MujocoSimulator:
         external: Float[np.ndarray, " nv"] | None = None,
     ) -> Snapshot:
         """Advance by one time step; see `Simulator.step`."""
-        data, applied, before = self._data, self._applied, float(self._data.time)
+        applied = self._command(torques)
+        if external is not None:
+            base = pin.Quaternion(*self._qpos[3:7]).matrix()
+            applied[:3] = base @ external[:3]
+            applied[3:6] = external[3:6]
+            applied[self._joints] += external[6:]
+        return self._advance(1)
+
+    def repeat(self, torques: Float[np.ndarray, " n"], steps: int) -> Snapshot:
+        """Advance by several time steps; see `RepeatingSimulator.repeat`."""
+        if self._stance.loads:  # they follow their links from step to step
+            for _ in range(steps - 1):
+                self.step(torques)
+            return self.step(torques)
+        self._command(torques)
+        return self._advance(steps)
+
+    def _command(self, torques: np.ndarray) -> np.ndarray:
+        """The engine's generalised forces, those of the motors written."""
         # Motors and pushes are generalised forces, without MuJoCo's gears and ranges.
+        applied = self._applied
         if self._drive is None:
             applied[self._joints] = torques
         else:
             applied[self._joints] = self._drive.on_joints(torques)
             self._drive.apply_loads()
         applied[:6] = 0.0
-        if external is not None:
-            base = pin.Quaternion(*self._qpos[3:7]).matrix()
-            applied[:3] = base @ external[:3]
-            applied[3:6] = external[3:6]
-            applied[self._joints] += external[6:]
+        return applied
+
+    def _advance(self, steps: int) -> Snapshot:
+        """Let the engine go on under the forces written."""
+        data, before = self._data, float(self._data.time)
         shown = self._mujoco.get_mju_user_warning()
         self._mujoco.set_mju_user_warning(_quiet)  # else it writes a log file here
-        self._mujoco.mj_step(self._model, data)
+        self._mujoco.mj_step(self._model, data, steps)
         self._mujoco.set_mju_user_warning(shown)
         warned = self._fatal_warnings() if any(self._warnings.tolist()) else []
         if warned or not data.time > before:

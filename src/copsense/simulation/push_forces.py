@@ -20,6 +20,10 @@ class PushForces:
         self._frames = [stance.robot.frame_id(push.frame) for push in self._pushes]
         self._data = self._model.createData()
 
+    def rest(self, time: float, duration: float) -> bool:
+        """Whether no push acts for a while from a time on [s]."""
+        return not any(push.share(time, duration) for push in self._pushes)
+
     def at(self, now: Snapshot) -> Float[np.ndarray, " nv"] | None:
         """Generalised force (nv,) of all pushes during the next step, or None without any."""
         if not self._pushes:

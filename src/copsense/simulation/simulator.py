@@ -96,6 +96,22 @@ class Simulator(Protocol):
 
 
 @runtime_checkable
+class RepeatingSimulator(Simulator, Protocol):
+    """A simulator that advances by several time steps at once, without the states in between."""
+
+    def repeat(self, torques: Float[np.ndarray, " n"], steps: int) -> Snapshot:
+        """What as many calls of `step` with the same torques give, the last one's snapshot.
+
+        Args:
+            torques: joint torques (n,) in the robot's order [Nm, N], held during all steps.
+            steps: how many.
+
+        Raises:
+            SimulatorStoppedError: the motion is no longer finite; its time is that of the call.
+        """
+
+
+@runtime_checkable
 class AlterableSimulator(Simulator, Protocol):
     """A simulator whose ground and robot may differ from the controller's model."""
 
