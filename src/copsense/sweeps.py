@@ -15,7 +15,6 @@ from copsense.criterion import Criterion
 from copsense.errors import (
     CopsenseError,
     InvalidInputError,
-    UndeterminedWrenchError,
     UnknownNameError,
 )
 from copsense.extras import require
@@ -24,17 +23,17 @@ from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits, check_limits
 from copsense.path import PosturePath, check_path
 from copsense.provenance import made_by, read_plain
-from copsense.sensitivity import CopSensitivity, cop_sensitivity
-from copsense.stance import Stance
+from copsense.sensitivity import CopSensitivity
 from copsense.statics import (
     ConstrainedEquilibrium,
     WrenchPolicy,
     named_criteria,
     tie_break_note,
-    with_tie_break,
 )
 from copsense.sweep_layout import SweepRows, sweep_dataset
 from copsense.sweep_margins import with_limit_margins
+from copsense.sweep_sway import evaluate_row, passing_instant, with_sway
+from copsense.timed_path import Sway
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,6 +102,26 @@ class Sweep(LabelledResult):
             return None
         del found["is"]
         return Limits(**found | {"friction_sides": int(found["friction_sides"])})
+
+    @property
+    def period(self) -> float | None:
+        """Of the sway that every row is an instant of [s]; None at rest."""
+        found = self.attrs.get("period")
+        return None if found is None else float(found)
+
+    @property
+    def static_frequencies(self) -> dict[str, dict[str, float]]:
+        """Criterion -> output -> up to which its statics are within 5 % in a sway [Hz].
+
+        NaN for an output that stands still at rest; empty for a sweep at rest.
+        """
+        if "static_frequency" not in self:
+            return {}
+        found = self["static_frequency"]
+        return {
+            name: dict(zip(self.labels("output"), map(float, row), strict=True))
+            for name, row in zip(self.labels("criterion"), found.values, strict=True)
+        }
 
     @property
     def planted(self) -> xr.DataArray:
@@ -216,11 +235,13 @@ class Sweep(LabelledResult):
                 name: {
                     "planted": ranges[name],
                     "smallest_margin": float(self["margin"].sel(criterion=name).min()),
+                    "static_frequency": self.static_frequencies.get(name),
                     "largest_residual": float(self["residual"].sel(criterion=name).max()),
                 }
                 for name in self.labels("criterion")
             },
             "limits": None if limits is None else repr(limits),
+            "period": self.period,
             "without_sole": self.attrs["without_sole"],
             "notes": list(self.notes),
         }
@@ -263,6 +284,8 @@ class Sweep(LabelledResult):
         contacts, names = self.labels("contact"), self.labels("criterion")
         unit = self.coordinate.attrs.get("units", "")
         lines = [f"  contacts: {_listed(contacts)}"]
+        if self.period is not None:
+            lines.append(f"  in a sway of {self.period:g} s")
         word, ranges = "every contact planted", self.planted_range
         if self.limits is not None:
             lines.append(f"  within {self.limits}")
@@ -296,6 +319,7 @@ def sweep(
     criteria: Sequence[Criterion | WrenchPolicy],
     limits: Limits | None = None,
     *,
+    period: float | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Sweep:
     """Evaluate every criterion at every posture of a path.
@@ -306,6 +330,11 @@ def sweep(
         limits: what the wrenches and torques must respect; None for nothing. The active ones of
             each row are then named in ``active_limits``, separated by semicolons, and every row has
             its margins to them in ``limit_margin``.
+        period: sway along the whole path and back in this time [s] instead of standing still at
+            each posture, see `copsense.timed_path.Sway`: wrenches, torques, centres of pressure and
+            margins carry the inertia, and ``cop_slope`` is along the sway; other derivatives hold
+            the numbers of velocity and acceleration. ``static_frequency`` says up to which
+            frequency the statics of each output are within 5 %.
         progress: called with 1 after each posture.
 
     A criterion that leaves forces undetermined which contacts exert against each other alone is
@@ -316,7 +345,8 @@ def sweep(
 
     Raises:
         InvalidInputError: there is no criterion, two have one name, or a policy is given with
-            limits, within which only a criterion can be solved.
+            limits or a period, within which only a criterion can be solved; or there is no
+            curve to sway along.
     """
     require("xarray", "a sweep")
     check_path(path)
@@ -324,17 +354,21 @@ def sweep(
         check_limits(limits)
     given = named_criteria(criteria, "a sweep")
     chosen = dict(given)  # a tie-break that one posture needs serves all after it
-    _check_policies(chosen, limits)
+    _check_policies(chosen, limits, period)
+    sway = None if period is None else Sway(path, period)
     rows = SweepRows(path.stances[0], len(path), list(chosen))
-    for i, here in enumerate(path.stances):
+    for i in range(len(path)):
+        passing = passing_instant(sway, path, i, rows)
         for j, (name, criterion) in enumerate(chosen.items()):
             if i in path.failures:
                 rows.reason[i, j] = path.failures[i]
                 continue
+            if rows.reason[i, j]:
+                continue
             try:
-                found = _sensitivity(here, criterion, limits)
+                found, slope = evaluate_row(path, i, criterion, limits, passing)
                 chosen[name] = found.equilibrium.criterion
-                _fill(rows, (i, j), found, path.tangents[i])
+                _fill(rows, (i, j), found, slope)
             except CopsenseError as error:
                 rows.reason[i, j] = str(error)
         if progress:
@@ -342,6 +376,8 @@ def sweep(
     tied = [tie_break_note(name) for name in chosen if chosen[name] != given[name]]
     made = made_by(path.stances[0], list(chosen.values()), limits, tied)
     dataset = sweep_dataset(path, rows, made)
+    if sway is not None:
+        dataset = with_sway(dataset, sway, list(chosen.values()), limits)
     if limits is not None:
         meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
         dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
@@ -350,23 +386,16 @@ def sweep(
     return Sweep(dataset)
 
 
-def _sensitivity(
-    stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits | None
-) -> CopSensitivity:
-    """The sensitivity, with a tie-break in the criterion where it needs one."""
-    try:
-        return cop_sensitivity(stance, criterion, limits)
-    except UndeterminedWrenchError:
-        if not isinstance(criterion, Criterion):
-            raise
-        return cop_sensitivity(stance, with_tie_break(stance, criterion), limits)
-
-
 def _check_policies(
-    criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None
+    criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None, period: float | None
 ) -> None:
-    """Reject a policy within limits."""
+    """Reject a policy within limits, or in motion."""
     policies = [name for name, c in criteria.items() if not isinstance(c, Criterion)]
+    if period is not None and policies:
+        raise InvalidInputError(
+            f"{policies[0]} is a policy q -> wrenches: it does not know how the robot moves. Leave "
+            "the period out, or give a Criterion."
+        )
     if limits is not None and policies:
         raise InvalidInputError(
             f"{policies[0]} is a policy: its wrenches are what it says, and limits cannot change "
@@ -375,7 +404,7 @@ def _check_policies(
         )
 
 
-def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, tangent: np.ndarray) -> None:
+def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, slope: np.ndarray) -> None:
     """Enter what one posture and criterion gave."""
     equilibrium = found.equilibrium
     margins = _margins(found)
@@ -384,7 +413,7 @@ def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, tangent: 
         "wrench": equilibrium.wrenches,
         "torque": equilibrium.torques,
         "cop_sensitivity": found.gradient,
-        "cop_slope": found.gradient @ tangent,
+        "cop_slope": slope,
         "cop_gain": found.com_gain,
         "worst_case_gain": found.worst_case_gain,
         "com_travel": found.com_travel,

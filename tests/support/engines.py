@@ -76,6 +76,32 @@ class MujocoRobot:
         axes = self.data.xmat[body].reshape(3, 3).T
         return np.vstack([axes @ linear, axes @ angular])[:, self.columns] @ self.world
 
+    def inverse_dynamics(self, q, motion):
+        """M dv/dt + C v + G by mj_inverse, without friction, damping and contacts."""
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        self.model.dof_damping[:] = self.model.dof_frictionloss[:] = 0.0
+        self.move(q)
+        v, turned = motion.velocity, np.array(motion.acceleration)
+        # d/dt of linear velocity in world axes: R (a + w x v).
+        turned[:3] += np.cross(v[3:6], v[:3])
+        self.data.qvel[self.columns], self.data.qacc[self.columns] = (
+            self.world @ v,
+            self.world @ turned,
+        )
+        mujoco.mj_inverse(self.model, self.data)
+        return self.world.T @ self.data.qfrc_inverse[self.columns]
+
+    def imbalance(self, equilibrium):
+        """What an equilibrium in motion leaves of MuJoCo's inverse dynamics (nv,) [N, Nm]."""
+        stance = equilibrium.stance
+        missing = self.inverse_dynamics(stance.q, stance.motion)
+        missing[6:] -= equilibrium.torques
+        for contact, wrench in zip(stance.contacts, equilibrium.wrenches, strict=True):
+            placement = stance.robot.frame(contact.frame).placement
+            on_frame = placement.actInv(contact.on(stance.robot).placement).act(pin.Force(wrench))
+            missing -= self.jacobian(contact.frame).T @ on_frame.vector
+        return missing
+
 
 class IdyntreeRobot:
     """iDynTree: "mixed" base velocity, linear and angular in world axes at the base's origin."""

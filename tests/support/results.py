@@ -12,7 +12,7 @@ from copsense.batch import BatchKernel, PostureChart
 from copsense.comparison import ControllerChoice, PostureChoice, Rest, RobotChoice, make_plan
 from copsense.comparison.score import Score
 from copsense.controllers import BalancingController
-from copsense.controllers.target import Hold, lateral_reference
+from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
 from copsense.labelled import LabelledResult
@@ -33,6 +33,8 @@ from copsense.scan import limit_travel, next_active_set_change
 from copsense.simulation import ModelError, Scenario
 from copsense.simulation.prediction import predict
 from copsense.sole import read_sole
+from copsense.sway_levers import sway_levers
+from copsense.timed_path import Sway, TimedPath
 from support.driven_robots import everything, standing
 
 TORQUE, LENGTH = copsense.minimum_torque(), copsense.minimum_wrench(1.0)
@@ -112,6 +114,12 @@ def all_results(icub) -> dict[str, object]:
         "posture": copsense.solve_posture(icub, com=(None, 0.01, None)),
         "path": path,
         "path with a failure": copsense.lateral_sweep(bar, 0.0, 3.0, 2),
+        "sway": Sway(path, 1.0),
+        "instant": Sway(path, 1.0).at(float(path.values[1])),
+        "timed path": TimedPath(path, Hold()),
+        "sway levers": sway_levers(
+            copsense.solve_equilibrium(path.stances[2], TORQUE), path.tangents[2]
+        ),
         "list": copsense.path_through(bar, [bar.q]),
         "lateral path": LateralPath(bar),
         "scan": scan,
@@ -127,6 +135,7 @@ def all_results(icub) -> dict[str, object]:
         **{f"family {name}": family for name, family in families(icub).items()},
         "sweep": copsense.sweep(path, [TORQUE]),
         "prediction": predict(lateral_reference(icub, Hold()), TORQUE),
+        "prediction of a sway": predict(lateral_reference(icub, Sine(2e-3, 0.5)), TORQUE),
         "scenario": Scenario(1.0, model_error=ModelError(payload={"chest": 2.0})),
         "controller": BalancingController(icub, TORQUE),
         "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),

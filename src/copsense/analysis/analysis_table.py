@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from copsense.analysis.limit_lines import clipped, limit_lines
+from copsense.analysis.sway_lines import sway_lines
 from copsense.extras import require
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def text(data: dict[str, Any], joint_unit: Unit) -> str:
                 for column, word, width in zip(columns, line, widths, strict=True)
             ]
             lines.append(f"  {'  '.join(padded)}".rstrip())
-        lines += [f"  {line}" for line in limit_lines(row)]
+        lines += [f"  {line}" for line in (*limit_lines(row), *sway_lines(row))]
     return "\n".join([*lines, "", data["verdict"]])
 
 
@@ -56,7 +57,7 @@ def html(data: dict[str, Any], joint_unit: Unit) -> str:
             f"<tr>{''.join(f'<td>{markup.escape(word)}</td>' for word in line)}</tr>"
             for line in cells
         )
-        below = "<br>".join(map(markup.escape, limit_lines(row)))
+        below = "<br>".join(map(markup.escape, (*limit_lines(row), *sway_lines(row))))
         parts.append(
             f"<table><caption>{markup.escape(_title(name, row))}</caption><thead><tr>{head}</tr>"
             f"</thead><tbody>{body}</tbody></table>" + (f"<p>{below}</p>" if below else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from jaxtyping import Float
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
+from copsense.arrays import finite_number
 from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
@@ -33,6 +34,7 @@ from copsense.statics import (
     tie_break_note,
     with_tie_break,
 )
+from copsense.sway_levers import SwayLever, sway_levers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -56,6 +58,9 @@ class Analysis:
         notes: what to know about robot and stance: what of its file is not used, soles, joint
             limits, placeholders.
         checked: whether the derivatives were compared with finite differences.
+        period: of the sway asked about [s]; None for none.
+        sway: criterion's name -> what a sway about this posture does to its outputs; without
+            policies, and empty without a period.
     """
 
     stance: Stance
@@ -66,10 +71,12 @@ class Analysis:
     along: str | None
     notes: tuple[str, ...]
     checked: bool
+    period: float | None = None
+    sway: Mapping[str, tuple[SwayLever, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Own the tangent and the mappings."""
-        freeze(self, "tangent", "sensitivities", "limit_analyses")
+        freeze(self, "tangent", "sensitivities", "limit_analyses", "sway")
 
     @property
     def equilibria(self) -> dict[str, StaticEquilibrium]:
@@ -161,6 +168,18 @@ class Analysis:
         }
         if name in self.limit_analyses:
             row |= self.limit_analyses[name].to_dict()
+        if self.period is not None and name in self.sway:
+            row["sway"] = {
+                "period": self.period,
+                "outputs": {
+                    x.output: {
+                        "lever": x.lever,
+                        "static_frequency": x.frequency,
+                        "factor": x.factor(self.period),
+                    }
+                    for x in self.sway[name]
+                },
+            }
         return row
 
     def _contacts(self, found: CopSensitivity) -> dict[str, Any]:
@@ -206,6 +225,7 @@ def analyse(
     com_y: float | None = None,
     joints: Mapping[str, float] | None = None,
     check: bool = False,
+    period: float | None = None,
 ) -> Analysis:
     """Analyse one posture: centre of pressure, margin and sensitivity of every contact.
 
@@ -220,6 +240,8 @@ def analyse(
         com_y: world y likewise [m].
         joints: joint -> position to hold [rad, or m for a prismatic joint].
         check: compare the derivatives with finite differences.
+        period: of a sideways sway of the CoM about this posture [s]: `Analysis.sway` then says of
+            each output what it does to the slope, and up to which frequency statics are within 5 %.
 
     Raises:
         InvalidInputError: not a stance, or criteria without distinct names.
@@ -251,6 +273,13 @@ def analyse(
         for name, criterion in chosen.items():
             assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
             limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
+    if period is not None:
+        finite_number(period, "the period of a sway [s]", positive=True)
+    swayed = {
+        name: sway_levers(each.equilibrium, tangent)
+        for name, each in found.items()
+        if period is not None and isinstance(each.equilibrium.criterion, Criterion)
+    }
     notes = (
         *here.robot.notes,
         *tied,
@@ -260,7 +289,7 @@ def analyse(
         *sole_notes(here),
         *joint_limit_notes(here),
     )
-    return Analysis(here, tangent, found, within, limited, along, notes, check)
+    return Analysis(here, tangent, found, within, limited, along, notes, check, period, swayed)
 
 
 def _determined(

@@ -13,7 +13,7 @@ from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
 from copsense.cli.stance_memory import written
 from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import LENGTH, read_positions
+from copsense.cli.units import LENGTH, TIME, read_positions
 from copsense.errors import InvalidInputError
 
 
@@ -21,6 +21,7 @@ from copsense.errors import InvalidInputError
     epilog="\b\nExamples:\n"
     "  copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png\n"
     "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
+    "  copsense analyse icub --period 2s\n"
     "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
 )
 @stance_options
@@ -42,6 +43,13 @@ from copsense.errors import InvalidInputError
     help="Report the sensitivity per this joint too (per degree, or per metre for a prismatic "
     "joint), along the lateral path of the CoM.",
 )
+@click.option(
+    "--period",
+    type=TIME,
+    metavar="TIME",
+    help="Say what a sideways sway of this period does to loads and centres of pressure, and up to "
+    "which frequency statics are within 5 %.",
+)
 @click.option("--check", is_flag=True, help="Compare the derivatives with finite differences.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw the stance: .png, .svg or .pdf.")
 @click.option(
@@ -61,6 +69,7 @@ def analyse(
     com_y: float | None,
     joints: tuple[str, ...],
     along: str | None,
+    period: float | None,
     check: bool,
     picture: str | None,
     regions: str | None,
@@ -99,6 +108,7 @@ def analyse(
         com_y=com_y,
         joints=read_positions(joints, home.robot),
         check=check,
+        period=period,
     )
     written(analysis.stance, kept, robot, overwrite, options["package_dirs"])
     answer = analysis.to_dict()

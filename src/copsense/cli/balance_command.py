@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import math
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -189,6 +190,8 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
 
 
 def _print(recording: Recording) -> None:
+    from copsense.simulation.sway_comparison import sway_slopes
+
     attributes, end, tip = recording.attrs, recording.end, recording.tip
     through = tip and recording.completed
     click.echo(
@@ -217,5 +220,22 @@ def _print(recording: Recording) -> None:
         click.echo(
             f"  too fast for statics: in motion the centre of pressure goes up to "
             f"{excess * 1e3:.1f} mm ({share * 100:.0f} %) farther than the CoM. Statics are right "
-            f"within {_TOO_FAST * 100:.0f} % up to {attributes['quasi_static_frequency']:.2f} Hz"
+            f"within {_TOO_FAST * 100:.0f} % up to {_frequencies(attributes)}"
         )
+    for contact, found in sway_slopes(recording).items():
+        for key, what, unit in (("load", "load", "N/m"), ("cop_y", "CoP y", "mm/mm")):
+            if not found[key]["at rest"]:  # a point's centre of pressure stays
+                continue
+            told = ", ".join(f"{where} {slope:.4g}" for where, slope in found[key].items())
+            click.echo(f"  {what} of {contact} per CoM y [{unit}]: {told}")
+
+
+def _frequencies(attributes: Mapping[str, Any]) -> str:
+    """Up to where statics hold: the net CoP, and what else gives way earlier."""
+    net = attributes["quasi_static_frequency"]
+    known = json.loads(attributes.get("static_frequencies", "{}"))
+    least = min((f for f in known.values() if f is not None), default=net)
+    names = [name for name, f in known.items() if f == least]
+    if least > 0.99 * net:
+        return f"{net:.3f} Hz"
+    return f"{net:.3f} Hz in the net CoP, {least:.3f} Hz in the {names[0]}"

@@ -13,7 +13,7 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import read_range
+from copsense.cli.units import TIME, read_range
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 @click.command(
     epilog="\b\nExamples:\n"
     "  copsense sweep icub --com-y -0.07:0.07:201 --output icub.nc\n"
+    "  copsense sweep icub --com-y -30mm:30mm:61 --period 2s --output sway.nc\n"
     "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv"
 )
 @stance_options
@@ -57,6 +58,13 @@ if TYPE_CHECKING:
     help="Evaluate these: a row (nq numbers) per posture, .csv or .npy; the first fixes the feet.",
 )
 @click.option(
+    "--period",
+    type=TIME,
+    metavar="TIME",
+    help="Sway along the whole path and back in this time, with the inertia that takes, instead of "
+    "standing still at each posture.",
+)
+@click.option(
     "--output",
     type=click.Path(),
     help="Write netCDF (.nc, everything) or a table (.csv); print a summary alone if not given.",
@@ -73,6 +81,7 @@ def sweep(
     com_z: str | None,
     joint: str | None,
     configurations: str | None,
+    period: float | None,
     output: str | None,
     force: bool,
     as_json: bool,
@@ -98,7 +107,7 @@ def sweep(
     within = read_limits(limits)
     path = _read_path(read_stance(robot, **options), com, joint, configurations)
     with progress_bar(len(path), "criteria") as update:
-        swept = evaluate(path, chosen, within, progress=update)
+        swept = evaluate(path, chosen, within, period=period, progress=update)
     swept = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
     failures = swept.failed_rows
     if output is not None:
@@ -179,6 +188,13 @@ def _print(summary: dict[str, Any]) -> None:
                 f"; smallest margin on the way {_rounded(row['smallest_margin'] * 1e3):+.1f} mm"
             )
         click.echo(f"  {name}: {planted}")
+        known = {k: f for k, f in (row["static_frequency"] or {}).items() if f is not None}
+        if known:
+            least = min(known, key=known.__getitem__)
+            click.echo(
+                f"    this sway: {1 / summary['period']:.3g} Hz; statics are within 5 % up to "
+                f"{known[least]:.3f} Hz (least: {least})"
+            )
     if summary["without_sole"]:
         click.echo(
             f"note: no sole is known under {summary['without_sole']}, so when it tips is not "

@@ -6,6 +6,7 @@ controller applies, so a comparison holds the theory against physics, not agains
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,7 @@ from copsense.content import ShortRepr, freeze
 from copsense.controllers import STIFF, Gains
 from copsense.controllers.target import PathReference, Ramp, Signal, lateral_reference
 from copsense.criterion import Criterion
+from copsense.json_data import json_data
 from copsense.limits import Limits
 from copsense.margins import MarginTable, margin_table
 from copsense.scan import PathScan
@@ -25,7 +27,13 @@ from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
+from copsense.simulation.timed_prediction import (
+    TimedPrediction,
+    cops_or_nan,
+    predict_in_motion,
+)
 from copsense.stance import Stance
+from copsense.sway_levers import SwayLever, sway_levers
 
 # What keeps a contact in its place, but for friction, which is taken as a cone below.
 _GROUND = Limits(normal_force=0.0, friction=None, cop_margin=0.0, torsion=None)
@@ -42,6 +50,7 @@ class StaticPrediction(ShortRepr):
     Attributes:
         values: the path's coordinate, relative to the start (N,) [m].
         cops: centre of pressure of each contact (N, nc, 2), contact axes [m]; NaN where unloaded.
+        loads: normal force of each contact (N, nc) [N].
         margins: smallest distance of a centre of pressure to its sole's edge (N,) [m]; infinite
             without soles, NaN where a contact carries no load.
         torques: of the motors (N, n) [Nm].
@@ -55,10 +64,13 @@ class StaticPrediction(ShortRepr):
         reach: how far the path goes to that side [m]: nothing is known beyond.
         start: the equilibrium at the start, and its derivatives along the path.
         quasi_static: how far the motion is from one that is slow enough for statics.
+        levers: at the start, what a sway does to each output of the statics.
+        in_motion: the same with inertia, of a sine; None for another signal.
     """
 
     values: Float[np.ndarray, " N"]
     cops: Float[np.ndarray, "N nc 2"]
+    loads: Float[np.ndarray, "N nc"]
     margins: Float[np.ndarray, " N"]
     torques: Float[np.ndarray, "N n"]
     joints: Float[np.ndarray, "N j"]
@@ -69,10 +81,12 @@ class StaticPrediction(ShortRepr):
     reach: float
     start: ScanPoint
     quasi_static: QuasiStatic
+    levers: tuple[SwayLever, ...] = ()
+    in_motion: TimedPrediction | None = None
 
     def __post_init__(self) -> None:
         """Own the arrays."""
-        freeze(self, "values", "cops", "margins", "torques", "joints")
+        freeze(self, "values", "cops", "loads", "margins", "torques", "joints")
 
     @property
     def statement(self) -> str:
@@ -122,6 +136,11 @@ class StaticPrediction(ShortRepr):
         what = {"units": "m", "long_name": "static centre of pressure along the path, contact axes"}
         dataset = recording.to_xarray().assign(
             static_cop=(("static", "contact", "axis"), self.cops, what),
+            static_load=(
+                ("static", "contact"),
+                self.loads,
+                {"units": "N", "long_name": "static normal force along the path"},
+            ),
             static_joint=(
                 ("static", "joint"),
                 self.joints,
@@ -133,7 +152,26 @@ class StaticPrediction(ShortRepr):
                 {"units": "m", "long_name": "where on the path, from its start"},
             ),
         )
+        if self.in_motion is not None:
+            moving = "with the inertia of the sway, along the path"
+            dataset = dataset.assign(
+                timed_cop=(
+                    ("static", "contact", "axis"),
+                    self.in_motion.cops,
+                    {"units": "m", "long_name": f"centre of pressure {moving}, contact axes"},
+                ),
+                timed_load=(
+                    ("static", "contact"),
+                    self.in_motion.loads,
+                    {"units": "N", "long_name": f"normal force {moving}"},
+                ),
+            )
+            dataset = dataset.assign_attrs(
+                sway_amplitude=self.in_motion.amplitude, sway_frequency=self.in_motion.frequency
+            )
+        frequencies = {x.output: x.frequency for x in self.levers}
         return Recording(dataset).with_attributes(
+            static_frequencies=json.dumps(json_data(frequencies)),
             static_excursion=self.excursion,
             static_contact=self.contact,
             static_how=self.how,
@@ -191,11 +229,13 @@ def predict(
     values = np.asarray(path.values, dtype=float)
     shape = len(values), len(start.stance.contacts)
     cops, margins = np.full((*shape, 2), np.nan), np.full(len(values), np.nan)
+    loads = np.full(shape, np.nan)
     torques = np.full((len(values), len(start.torques)), np.nan)
     for i, value in enumerate(values):
         if i not in path.failures:
             point = scan.at(float(value))
-            cops[i], torques[i] = _cops(point), point.torques
+            loads[i] = point.equilibrium.wrenches[:, 2]
+            cops[i], torques[i] = cops_or_nan(point.equilibrium), point.torques
             margins[i] = gaps.margin(point)
     robot = start.stance.robot
     joints = np.array(
@@ -204,6 +244,7 @@ def predict(
     return StaticPrediction(
         values,
         cops,
+        loads,
         margins,
         torques,
         joints,
@@ -214,6 +255,8 @@ def predict(
         float(max(side * values.max() if side > 0 else -values.min(), 0.0)),
         start,
         quasi_static(start.stance, start.tangent, reference.signal),
+        sway_levers(start.equilibrium, start.tangent),
+        predict_in_motion(reference, criterion, limits),
     )
 
 
@@ -305,11 +348,3 @@ class _Gaps:
         edges = np.flatnonzero([self.table.kinds[rows[0]] == "cop" for rows in self.table.groups])
         margins = self.table.group_margins(point.forces, point.torques)[edges]
         return float(margins.min(initial=np.inf))
-
-
-def _cops(point: ScanPoint) -> Float[np.ndarray, "nc 2"]:
-    """Centre of pressure of each contact [m]; NaN where it carries no load."""
-    w = point.equilibrium.wrenches
-    loaded = np.array([n not in point.equilibrium.unloaded for n in point.stance.contact_names])
-    fz = np.where(loaded, w[:, 2], 1.0)
-    return np.where(loaded[:, None], np.column_stack([-w[:, 4], w[:, 3]]) / fz[:, None], np.nan)

@@ -15,10 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.controllers.target import Signal
-from copsense.rigid_body import momentum_map
 from copsense.stance import Stance
-
-STATIC_SHARE = 0.05  # of the CoM's motion: up to here statics are called good enough
+from copsense.sway_levers import STATIC_SHARE, net_lever, static_frequency
 
 
 @dataclass(frozen=True)
@@ -51,21 +49,13 @@ def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Sign
         tangent: dq/dcoordinate there (nv,).
         signal: the coordinate, relative to the start, as a function of time.
     """
-    mass = stance.robot.mass
-    g = stance.robot.weight / mass
-    ground = float(np.mean([place.translation[2] for place in stance.placements]))
-    height = float(stance.com[2]) - ground
-    _, _, _, ax, ay, _ = momentum_map(stance.robot, stance.q) @ tangent
-    vx, vy, _ = stance.com_jacobian @ tangent
-    speed = math.hypot(vx, vy)
-    if speed == 0:
-        return QuasiStatic(0.0, 0.0, 0.0, math.inf)
-    lever = math.hypot(height * vx + ay / mass, height * vy - ax / mass) / speed
+    g = stance.robot.weight / stance.robot.mass
+    along, across, speed = net_lever(stance, tangent)
+    lever = math.hypot(along, across)
     excess = lever * speed * peak_acceleration(signal) / g
     reach = speed * max(abs(end) for end in signal.extent)
     share = excess / reach if reach else 0.0 if excess == 0 else math.inf
-    frequency = math.sqrt(STATIC_SHARE * g / lever) / (2 * math.pi) if lever else math.inf
-    return QuasiStatic(lever, excess, share, frequency)
+    return QuasiStatic(lever, excess, share, static_frequency(lever, g))
 
 
 def peak_acceleration(signal: Signal) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -12,6 +13,7 @@ from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.simulation.events import Event
+from copsense.simulation.sway_comparison import compare_sway, sway_slopes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -187,6 +189,8 @@ class Recording(LabelledResult):
                 name: attributes.get(f"quasi_static_{name}")
                 for name in ("lever", "excess", "share", "frequency")
             },
+            "static_frequencies": json.loads(attributes.get("static_frequencies", "{}")),
+            "sway": {"range": compare_sway(self), "slope": sway_slopes(self)},
             "notes": list(self.notes),
         }
         return dict(json_data(data))

@@ -177,13 +177,20 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         return program.violation(self.forces, base, self.row_multipliers)
 
     def derivative(
-        self, directions: Float[np.ndarray, "nv p"]
+        self,
+        directions: Float[np.ndarray, "nv p"],
+        load_rate: Float[np.ndarray, "nv p"] | None = None,
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
         """Derivatives with the pressing limits held, and the touching ones ignored.
 
         Where nothing only touches this is the derivative; elsewhere use `rates`.
+
+        Args:
+            directions: velocities V with J V = 0, as columns.
+            load_rate: how N changes besides, as of `StaticEquilibrium.derivative`.
         """
-        solved = self._problem.differentiate(self, directions, np.flatnonzero(self._problem.strong))
+        held = np.flatnonzero(self._problem.strong)
+        solved = self._problem.differentiate(self, directions, held, load_rate)
         return solved[0], solved[1]
 
     def pressing_after(self, direction: Float[np.ndarray, " nv"]) -> Int[np.ndarray, " a"]:
@@ -348,21 +355,25 @@ class _Problem:
         )
 
     def differentiate(
-        self, at: ConstrainedEquilibrium, V: Float[np.ndarray, "nv p"], held: np.ndarray
+        self,
+        at: ConstrainedEquilibrium,
+        V: Float[np.ndarray, "nv p"],
+        held: np.ndarray,
+        load_rate: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows along V, with these rows held."""
-        base, joints, change, bound = self.rates_of_data(at, V)
+        base, joints, change, bound = self.rates_of_data(at, V, load_rate)
         df, _, dl = self.program.hold(held, change, base, bound[held])
         return df, joints - self.load.joint_map.dot(df), dl
 
     def rates_of_data(
-        self, at: ConstrainedEquilibrium, V: np.ndarray
+        self, at: ConstrainedEquilibrium, V: np.ndarray, load_rate: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
 
         The first in two parts, base and joints; the second with the multipliers' part.
         """
-        AV = self.stance.robot.by_drive(self.stance.balance_derivative(at.forces).dot(V))
+        AV = self.stance.load_change(at.forces, V, load_rate)
         base, joints = AV[: self.nb], AV[self.nb :]
         weighted = self.W.dot(joints)
         if self.quadratic.inertia:

@@ -125,12 +125,17 @@ class StaticEquilibrium:
         return float(np.abs(needed).max())
 
     def derivative(
-        self, directions: Float[np.ndarray, "nv p"]
+        self,
+        directions: Float[np.ndarray, "nv p"],
+        load_rate: Float[np.ndarray, "nv p"] | None = None,
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
         """Derivatives of forces and torques along admissible motions, exact.
 
         Args:
             directions: velocities V with J V = 0, as columns.
+            load_rate: how N (`Stance.balance`) changes besides as the posture does [N, Nm], as
+                the inertia of a motion does; None for nothing. With zero directions the answer is
+                to this alone.
 
         Returns:
             d forces (m, p) and d torques (n, p).
@@ -150,7 +155,7 @@ class StaticEquilibrium:
             if not is_admissible(self.stance, directions):
                 raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
         system = self._system or Kkt(self.stance, self.criterion)
-        return system.derivative(self, directions)
+        return system.derivative(self, directions, load_rate)
 
     @property
     def _loads(self) -> Iterable[tuple[str, float]]:

@@ -89,11 +89,14 @@ class Kkt:
         return forces, problem.torques(forces), self.stance.robot.from_drives(nu)
 
     def derivative(
-        self, at: StaticEquilibrium, V: Float[np.ndarray, "nv p"]
+        self,
+        at: StaticEquilibrium,
+        V: Float[np.ndarray, "nv p"],
+        load_rate: Float[np.ndarray, "nv p"] | None = None,
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
-        """Derivatives of forces and torques along admissible velocities V."""
+        """Derivatives of forces and torques along admissible velocities V, see its caller."""
         stance = self.stance
-        AV = stance.robot.by_drive(stance.balance_derivative(at.forces).dot(V))
+        AV = stance.load_change(at.forces, V, load_rate)
         right = np.empty((self.size + len(self.free), V.shape[1]))
         right[: self.size] = AV[self.on]
         if self.quadratic.inertia:
