@@ -8,6 +8,7 @@ import pytest
 from support.grounds import off_centre
 
 import copsense
+from copsense.freedom import com_span
 from copsense.limits import NO_LIMITS
 
 TORQUE, WRENCH = copsense.minimum_torque(), copsense.minimum_wrench(1.0)
@@ -134,3 +135,37 @@ def test_a_sole_that_is_a_line_tips_over_its_ends(stance_of):
     first = [copsense.scan.limit_travel(stance, TORQUE, COP_ONLY, s).first.exact for s in (1, -1)]
     assert min(found.com_travel) == pytest.approx(min(first), abs=1e-9)
     assert sorted(found.tipping_edge) == [0, 1]
+
+
+@pytest.mark.parametrize("name", ["icub", "solo12", "four_bar", "talos"])
+def test_the_com_goes_no_farther_than_its_span_with_the_contacts_in_place(stance_of, name):
+    stance = stance_of(name)
+    span = com_span(stance)
+    rng = np.random.default_rng(2)
+    robot, feet = stance.robot, [place.translation for place in stance.placements]
+    model = robot.model
+    lower, upper = robot.position_limits
+    lower, upper = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    coms = []
+    for _ in range(60):  # joints anywhere, one contact in place: more than the robot can do
+        q = pin.integrate(
+            model,
+            np.array(stance.q),
+            np.concatenate(
+                [np.zeros(robot.base_nv), rng.uniform(lower, upper) - stance.q[-len(lower) :]]
+            ),
+        )
+        here = stance.at(q, check=False)
+        coms.append(np.linalg.norm(here.com - here.placements[0].translation))
+    assert 2 * max(coms) < span
+    assert span < 20 * np.linalg.norm(stance.com - feet[0])  # and it is no empty bound
+
+
+def test_a_travel_beyond_the_span_is_printed_as_never(icub):
+    found = copsense.analyse(icub, [WRENCH])
+    travel = found.sensitivities["minimum-wrench"].unloading_travel
+    assert np.isfinite(travel).all()
+    assert travel.min() > com_span(icub)
+    rows = [line for line in str(found).splitlines() if line.strip().startswith(("l_sole", "r_"))]
+    assert all(row.endswith("never") for row in rows)
+    assert found.to_dict()["com_span"] == com_span(icub)

@@ -111,7 +111,8 @@ def test_a_segment_has_its_two_ends_and_two_sides(a, b, point):
     along = (high - low) / np.linalg.norm(high - low)
     expected = [along @ (point - low), along @ (high - point)]
     np.testing.assert_allclose(segment.distances(point), expected, atol=1e-12)
-    sides = segment.across.normals
+    sides, beside = segment.sides
+    np.testing.assert_allclose(sides @ low, beside, atol=1e-12)
     np.testing.assert_allclose(sides @ along, 0.0, atol=1e-12)
     np.testing.assert_allclose(sides.sum(axis=0), 0.0, atol=1e-12)
     clipped = segment.clip(along, float(along @ low) - 1.0)

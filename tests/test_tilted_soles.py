@@ -1,6 +1,7 @@
 """A sole that is tilted against its frame is named with its angle; one that is a line stands."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +11,7 @@ from support.tiny import FEET, MJCF, urdf
 
 import copsense
 from copsense import Contact
+from copsense.batch import evaluate_batch
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.polygon import Polygon
 from copsense.sole import levelled, read_sole
@@ -87,6 +89,20 @@ def test_any_line_is_a_polygon_whose_margin_is_to_its_nearer_end():
         sole = Contact("foot", polygon=ends).sole
         assert isinstance(sole, Polygon)
         assert sole.margin(point).distance == pytest.approx(expected, abs=1e-12)
+        # Off the line there is nothing to stand on, however far the ends are.
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        off = rng.uniform(-0.1, 0.1)
+        aside = point + off * np.array([-along[1], along[0]])
+        found = sole.margin(aside)
+        assert found.distance == pytest.approx(-abs(off), abs=1e-12)
+        assert found.edge in (2, 3)
+        assert found.side.endswith("of its line")
+        np.testing.assert_allclose(found.normal * abs(off), aside - point, atol=1e-12)
+        assert sole.margins(np.array([point, aside])).tolist() == pytest.approx(
+            [expected, -abs(off)], abs=1e-12
+        )
+        beyond = ends[1] + 0.05 * along + 0.02 * np.array([-along[1], along[0]])
+        assert sole.margin(beyond).distance == pytest.approx(-0.05, abs=1e-12)
 
 
 @pytest.mark.parametrize(("roll", "pitch"), [(3.0, 0.0), (0.0, -7.0), (3.0, 4.0), (-12.0, 5.0)])
@@ -148,3 +164,29 @@ def test_soles_are_levelled_in_python_in_a_stance_file_and_in_the_shell(tmp_path
     np.testing.assert_allclose(
         saved.contacts[0].rotation, stance.contacts[0].rotation, rtol=0, atol=1e-12
     )
+
+
+def test_a_foot_on_a_line_tips_as_soon_as_its_cop_leaves_it(icub):
+    line = copsense.rectangle((-0.05, 0.1))
+    contacts = [replace(c, polygon=line) for c in icub.contacts]
+    stance = copsense.Stance(icub.robot, icub.q, contacts)
+    found = copsense.cop_sensitivity(stance, copsense.minimum_torque())
+    off = np.abs(found.cop[:, 1])
+    assert off.min() > 1e-6
+    table = copsense.analyse(stance, [copsense.minimum_torque()]).to_dict()
+    rows = table["criteria"]["minimum-torque"]["contacts"]
+    for k, name in enumerate(stance.contact_names):
+        assert rows[name]["margin"] == pytest.approx(-off[k], abs=1e-12)
+        assert rows[name]["tipping_edge"] in (2, 3)
+        # Back on the line by the steepest way, to first order of f_z p_y.
+        share, slope = found.equilibrium.wrenches[k, 2] / stance.robot.weight, found.load_gain[k]
+        rate = share * found.com_gain[k, 1] + found.cop[k, 1] * slope
+        back = -share * off[k] / np.linalg.norm(rate)
+        assert found.com_travel[k] == pytest.approx(back, rel=1e-9)
+    # The other criterion keeps the CoP on the line here, and leaves it with the first step.
+    on = copsense.cop_sensitivity(stance, copsense.minimum_wrench(1.0))
+    assert np.abs(on.cop[:, 1]).max() < 1e-9
+    assert on.com_travel.tolist() == [0.0, 0.0]
+    batch = evaluate_batch(stance, icub.q[None], [copsense.minimum_torque()])
+    np.testing.assert_allclose(batch.com_travel[0, 0], found.com_travel, rtol=1e-9)
+    np.testing.assert_allclose(batch.margin[0, 0], -off, rtol=0, atol=1e-12)

@@ -182,10 +182,15 @@ class Contact(ShortRepr):
 
     @cached_property
     def edge_rows(self) -> Float[np.ndarray, "e 6"]:
-        """Row of each edge of the sole: times the contact's wrench, f_z (b - a . p) [N m]."""
+        """Row of each edge of the sole: times the contact's wrench, f_z (b - a . p) [N m].
+
+        The sole of a surface contact that is a line has two rows more, for its sides.
+        """
         if self.sole is None:
             return read_only(np.zeros((0, 6)))
-        edges = zip(self.sole.normals, self.sole.offsets, strict=True)
+        edges = [*zip(self.sole.normals, self.sole.offsets, strict=True)]
+        if self.kind == "surface":
+            edges += zip(*self.sole.sides, strict=True)
         return read_only(np.array([edge_row(a, b) for a, b in edges]))
 
     @property

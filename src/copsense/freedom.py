@@ -46,6 +46,35 @@ def check_com_moves(stance: Stance, axis: int) -> None:
     )
 
 
+def com_span(stance: Stance) -> float:
+    """A length that the CoM's travel cannot exceed while the contacts stay in place [m].
+
+    With a contact in place every link stays within its chain's length of it, so the CoM within
+    R = length to the base + mass-weighted length from the base, and two such places are within 2 R
+    of each other. Infinite where a prismatic joint has no end.
+    """
+    robot = stance.robot
+    model = robot.model
+    lower, upper = robot.position_limits
+    steps = [float(np.linalg.norm(place.translation)) for place in model.jointPlacements]
+    steps[:2] = [0.0, 0.0]  # the universe, and where the file puts the base
+    reach = np.maximum(np.abs(lower), np.abs(upper))
+    for k in range(2, model.njoints):
+        first = model.joints[k].idx_v - robot.base_nv
+        own = range(first, first + model.joints[k].nv)
+        steps[k] += sum(float(reach[i]) for i in own if robot.dof_units[i] == "m")
+    far = [sum(steps[j] for j in model.supports[k]) for k in range(model.njoints)]
+    spread = sum(
+        inertia.mass * (far[k] + float(np.linalg.norm(inertia.lever)))
+        for k, inertia in enumerate(model.inertias)
+    )
+    feet = []
+    for contact in stance.contacts:
+        where = contact.on(robot)
+        feet.append(far[where.joint] + float(np.linalg.norm(where.placement.translation)))
+    return 2.0 * (min(feet) + spread / robot.mass)
+
+
 def missing_joints(stance: Stance) -> tuple[str, ...]:
     """What limbs with too few joints cannot do, a clause for each kind; empty where none lacks any.
 

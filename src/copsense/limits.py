@@ -393,10 +393,8 @@ def _cop_rows(contact: Contact, sole: Polygon, margin: float) -> list[Row]:
     edges = list(zip(sole.normals, sole.offsets - margin, sole.edge_names, strict=True))
     if len(sole) == 2 and contact.kind == "surface":
         # A sole that is a line has two sides too, which leave no room across it.
-        sides = sole.across
-        beside = np.array([a @ sole.vertices[0] for a in sides.normals])
-        names = [f"the {sides.side(i)} side" for i in range(2)]
-        edges += zip(sides.normals, beside, names, strict=True)
+        names = [f"the {sole.side(2 + i)} side" for i in range(2)]
+        edges += zip(*sole.sides, names, strict=True)
     return [("cop", f"CoP at {name}", -edge_row(a, b), 0.0) for a, b, name in edges]
 
 

@@ -21,6 +21,7 @@ from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError
 
 _ROUNDING = 1e-12  # m: how far beyond a line a vertex may be and still be on it
+_ON_LINE = 1e-9  # m: a point nearer to a segment is on it
 _FLAT = 1e-6  # m: how far a vertex may lie inside the line of its neighbours by rounding
 _AXES = {"x": 0, "y": 1}
 
@@ -33,7 +34,8 @@ class EdgeMargin(ShortRepr):
 
     Attributes:
         distance: signed distance to that edge's line [m]; negative outside.
-        edge: index of the edge, from vertex `edge` to the next.
+        edge: index of the edge, from vertex `edge` to the next; of a segment 0 and 1 are its ends,
+            2 and 3 its sides.
         side: which side of the polygon's axes that edge faces, such as ``"+y (left)"``.
         normal: the edge's outward unit normal (2,).
     """
@@ -173,18 +175,35 @@ class Polygon:
         return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
     @cached_property
-    def across(self) -> Polygon:
-        """A segment turned by a quarter about its middle: its edges are the segment's two sides."""
-        middle = self.vertices.mean(axis=0)
-        return Polygon(middle + (self.vertices - middle) @ np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    def sides(self) -> tuple[Float[np.ndarray, "s 2"], Float[np.ndarray, " s"]]:
+        """Normals and offsets of a segment's two sides, which leave no room across it; else none.
+
+        They are no edges: a point on the segment is as far from the nearest edge as from its ends.
+        """
+        if len(self) != 2:
+            return _owned(np.zeros((0, 2))), _owned(np.zeros(0))
+        normals = self.normals @ np.array([[0.0, -1.0], [1.0, 0.0]])
+        return _owned(normals), _owned(normals @ self.vertices[0])
 
     def distances(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n e"]:
         """Signed distance of points to the line of each edge [m], positive on the inner side."""
         return np.asarray(self.offsets - points @ self.normals.T)
 
     def margins(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n"]:
-        """Signed distance of points to the line of the nearest edge [m]; NaN where a point is."""
-        return np.asarray(self.distances(points).min(axis=-1))
+        """Signed distance of points to the line of the nearest edge [m]; NaN where a point is.
+
+        Of a segment: of points on it to the nearer end, of others from its line, if that is more.
+        """
+        nearest = self.distances(points).min(axis=-1)
+        if len(self) != 2:
+            return np.asarray(nearest)
+        off = -self._beside(points).min(axis=-1)
+        return np.asarray(np.where(off > _ON_LINE, np.minimum(nearest, -off), nearest))
+
+    def _beside(self, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
+        """Signed distance of points to each side of a segment's line [m], positive inside."""
+        normals, offsets = self.sides
+        return np.asarray(offsets - points @ normals.T)
 
     def margin(self, point: ArrayLike) -> EdgeMargin:
         """The margin of one point (2,) [m] to the nearest edge.
@@ -196,8 +215,17 @@ class Polygon:
             raise InvalidInputError(
                 f"a polygon of {len(self)} vertices has no edge to be near to. Give two or more."
             )
-        distances = self.distances(finite_array(point, "the point", (2,), "x, y [m]"))
+        p = finite_array(point, "the point", (2,), "x, y [m]")
+        distances = self.distances(p)
         edge = int(np.argmin(distances))
+        if len(self) == 2 and (beside := self._beside(p)).min() < min(-_ON_LINE, distances[edge]):
+            side = int(np.argmin(beside))
+            return EdgeMargin(
+                float(beside[side]),
+                2 + side,
+                f"{self.side(2 + side)} of its line",
+                self.sides[0][side],
+            )
         return EdgeMargin(float(distances[edge]), edge, self.side(edge), self.normals[edge])
 
     def boundary_distance(self, point: Float[np.ndarray, " 2"]) -> float:
@@ -211,7 +239,7 @@ class Polygon:
 
     def side(self, edge: int) -> str:
         """The side of the polygon's axes that an edge faces, such as ``"+y (left)"``."""
-        normal = self.normals[edge]
+        normal = np.vstack([self.normals, self.sides[0]])[edge]
         quarter = int(np.round(np.arctan2(normal[1], normal[0]) / (np.pi / 2))) % 4
         return ("+x (front)", "+y (left)", "-x (back)", "-y (right)")[quarter]
 

@@ -230,7 +230,8 @@ class CopSensitivity:
         are, so that ``|s| / |grad s|`` with ``grad s = (b - a . p) grad w - w a' Gamma`` is exact
         for such criteria. The least of a sole's edges counts, see `tipping_edge`. Negative where
         the CoP is off the sole already or the contact pulls; infinite where no edge comes nearer
-        (a point contact, or a contact without a sole).
+        (a point contact, or a contact without a sole). A sole that is a line tips over its side as
+        soon as the CoP leaves it.
         """
         return self._tipping[0]
 
@@ -238,7 +239,8 @@ class CopSensitivity:
     def tipping_edge(self) -> Int[np.ndarray, " nc"]:
         """Index of the sole's edge that `com_travel` goes to (nc,); -1 where it goes to none.
 
-        Edge i of a contact's polygon goes from its vertex i to the next.
+        Edge i of a contact's polygon goes from its vertex i to the next; of a sole that is a line,
+        0 and 1 are its ends, 2 and 3 its sides.
         """
         return self._tipping[1]
 
@@ -251,7 +253,10 @@ class CopSensitivity:
         travel, edge = [np.inf] * len(self.cop), [-1] * len(self.cop)
         # Plain numbers: a sole's few edges would take NumPy longer.
         for k, rows in enumerate(stance.edges):
+            line = (sole := stance.contacts[k].sole) is not None and len(sole) == 2
             for i in range(rows.start, rows.stop):
+                if line and abs(slack[i]) <= _ON_EDGE:
+                    slack[i] = 0.0  # on the line, whatever side rounding puts it
                 speed = math.hypot(*rate[i])
                 if speed > _STILL:
                     distance = slack[i] / speed

@@ -34,7 +34,7 @@ def text(data: dict[str, Any], joint_unit: Unit) -> str:
     """The analysis as ``copsense analyse`` prints it, without the notes."""
     lines = [*_heading(data)]
     for name, row in data["criteria"].items():
-        columns, cells = _cells(row, joint_unit)
+        columns, cells = _cells(row, joint_unit, data["com_span"])
         widths = [max(map(len, column)) for column in zip(columns, *cells, strict=True)]
         lines += ["", _title(name, row)]
         for line in (columns, *cells):
@@ -51,7 +51,7 @@ def html(data: dict[str, Any], joint_unit: Unit) -> str:
     """The analysis for notebooks."""
     parts = [f"<p>{'<br>'.join(map(markup.escape, _heading(data)))}</p>"]
     for name, row in data["criteria"].items():
-        columns, cells = _cells(row, joint_unit)
+        columns, cells = _cells(row, joint_unit, data["com_span"])
         head = "".join(f"<th>{markup.escape(column)}</th>" for column in columns)
         body = "".join(
             f"<tr>{''.join(f'<td>{markup.escape(word)}</td>' for word in line)}</tr>"
@@ -111,11 +111,11 @@ def _title(name: str, row: dict[str, Any]) -> str:
     return f"{name}: torque norm {row['torque_norm']:.2f} N m, residual {row['residual']:.1e} N"
 
 
-def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[str]]]:
+def _cells(row: dict[str, Any], joint_unit: Unit, span: float) -> tuple[list[str], list[list[str]]]:
     """Headings, and a line of words per contact."""
     contacts = row["contacts"]
     if all(c["kind"] == "point" for c in contacts.values()):
-        return _point_cells(row)
+        return _point_cells(row, span)
     along = [
         key for key in next(iter(contacts.values())) if key.startswith("cop_per_")
     ]  # one at most
@@ -135,9 +135,9 @@ def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[
                 margin,
                 f"{c['cop_gain'][1][1]:.3f}",
                 f"{c['worst_case_gain']:.3f}",
-                _travel(c["com_travel"], row),
+                _travel(c["com_travel"], row, span),
                 edge,
-                _travel(c["unloading_travel"], row),
+                _travel(c["unloading_travel"], row, span),
                 *(f"{c[key][1] * scale:.3f}" for key in along),
                 *(["PULLING" if c["pulling"] else ""] if pulls else []),
             ]
@@ -145,7 +145,7 @@ def _cells(row: dict[str, Any], joint_unit: Unit) -> tuple[list[str], list[list[
     return columns + [""] * pulls, lines
 
 
-def _point_cells(row: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+def _point_cells(row: dict[str, Any], span: float) -> tuple[list[str], list[list[str]]]:
     """The same where every contact is a point: how the load moves, and when one carries none."""
     contacts = row["contacts"]
     pulls = any(c["pulling"] for c in contacts.values())
@@ -157,14 +157,17 @@ def _point_cells(row: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
                 name,
                 f"{c['load_share']:.3f}",
                 f"{x:+.3f}, {y:+.3f}",
-                _travel(c["unloading_travel"], row),
+                _travel(c["unloading_travel"], row, span),
                 *(["PULLING" if c["pulling"] else ""] if pulls else []),
             ]
         )
     return [*_POINT_COLUMNS] + [""] * pulls, lines
 
 
-def _travel(travel: float, row: dict[str, Any]) -> str:
+def _travel(travel: float, row: dict[str, Any], span: float) -> str:
+    """A travel; farther than the CoM can go with its contacts in place is never, or already so."""
     if clipped(row):
         return "clipped"
-    return f"{travel * 1e3:.1f}" if math.isfinite(travel) else "never"
+    if abs(travel) <= span:
+        return f"{travel * 1e3:.1f}"
+    return "never" if travel > 0 else "already"

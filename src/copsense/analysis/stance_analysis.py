@@ -18,7 +18,7 @@ from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import UndeterminedWrenchError
-from copsense.freedom import freedom_notes
+from copsense.freedom import com_span, freedom_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, optional_limits, torque_placeholders
 from copsense.path import LateralPath
@@ -141,6 +141,7 @@ class Analysis:
                 {"name": c.name, "frame": c.frame, "kind": c.kind, "position": p.translation}
                 for c, p in zip(stance.contacts, stance.placements, strict=True)
             ],
+            "com_span": com_span(stance),
             "support_margin": self._support_margin,
             "criteria": {name: self._criterion(name) for name in self.sensitivities},
         }
@@ -305,7 +306,7 @@ def _determined(
         try:
             found[name] = tied = with_tie_break(stance, criterion)
             if tied is not criterion and limits is not None:
-                solve_equilibrium(stance, criterion, limits)  # says why it cannot
+                solve_equilibrium(stance, tied, limits)  # or says why it cannot
         except UndeterminedWrenchError as error:
             del found[name]
             errors.append(error)

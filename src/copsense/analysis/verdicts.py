@@ -37,8 +37,8 @@ def verdict(data: dict[str, Any]) -> str:
     distance, event = reach[best]
     if distance < 0:
         return f"Every criterion has a contact that tips or pulls; nearest to standing: {best}."
-    if not math.isfinite(distance):
-        return "No contact tips or unloads, to first order."
+    if distance > data["com_span"]:
+        return "No contact tips or unloads, to first order, wherever the CoM can go."
     return (
         f"{best} keeps the feet planted longest: to first order the CoM may move "
         f"{distance * 1e3:.1f} mm before {event}{_others(reach, best)}."

@@ -38,6 +38,7 @@ from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 from copsense.statics.equilibrium import StaticEquilibrium
+from copsense.statics.lexicographic import Lexicographic
 from copsense.statics.program import NoPointError, Program
 
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
@@ -55,7 +56,8 @@ class ActiveLimit:
         name: such as ``"l_sole: CoP at the +y (left) edge"`` or ``"torque of l_knee"``.
         kind: ``"normal force"``, ``"friction"``, ``"cop"``, ``"torsion"``, ``"wrench cone"`` or
             ``"torque"``.
-        multiplier: how hard the criterion presses against it; 0 where it only touches.
+        multiplier: how hard the criterion presses against it; 0 where it only touches, or where
+            only the tie-break presses.
     """
 
     name: str
@@ -209,6 +211,7 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         pressure f_z (b - a p)), a pressing one eases at the rate of its multiplier. What is only
         touched here has taken a side already. None if nothing closes in.
         """
+        self._problem.check_followed(np.flatnonzero(self._problem.tied), self.row_multipliers)
         rates = self.rates(direction)
         strong, touching = self._problem.strong, self._problem.strong | self._problem.weak
         left = np.where(touching, self.row_multipliers, self.slack)
@@ -239,7 +242,7 @@ def solve_constrained(
 
     Raises:
         InfeasibleError: no wrench respects the limits; says which demand how much more.
-        UndeterminedWrenchError: several wrenches are equally good.
+        UndeterminedWrenchError: several wrenches are equally good, and no tie-break chooses.
         UnsolvedError: no solver found wrenches that meet the optimality conditions.
     """
     problem = _Problem(stance, criterion, limits)
@@ -260,16 +263,19 @@ def distance_to_change(
     negative. The rates are exact where a distance is zero: the shares are held.
     """
     problem = _Problem(stance, criterion, limits)
-    optimum = problem.program.optimum(pressing)
+    optimum = (problem.program if problem.tie is None else problem.tie).optimum(pressing)
     multipliers = optimum.multipliers
     slack = problem.b - problem.A.dot(optimum.x)
+    gradient = max(float(np.abs(problem.H.dot(optimum.x) - problem.g).max()), 1e-300)
+    if problem.tie is not None:
+        pressed = np.abs(multipliers) * problem.scale > _PRESSING * gradient
+        problem.check_followed(pressing, np.where(pressed, multipliers, 0.0))
     found = problem.equilibrium(limits, optimum.x, optimum.equality, multipliers, slack)
     held = np.flatnonzero(multipliers)
     _, _, _, bound = problem.rates_of_data(found, tangent[:, None])
     df, _, dl = problem.differentiate(found, tangent[:, None], held)
     distance = slack / (problem.weight * problem.scale)
     rate = (bound - problem.A.dot(df))[:, 0] / (problem.weight * problem.scale)
-    gradient = max(float(np.abs(problem.H.dot(optimum.x) - problem.g).max()), 1e-300)
     distance[pressing] = (multipliers * problem.scale)[pressing] / gradient
     rate[pressing] = 0.0
     rate[held] = dl[:, 0] * problem.scale[held] / gradient
@@ -297,20 +303,45 @@ class _Problem:
         E, e = load.base_map.T, load.base_wrench
         self.program = Program(self.H, self.g, E, e, self.A, self.b, self.weight)
         self.scale = self.program.scale
-        self.strong = self.weak = np.zeros(len(self.b), dtype=bool)
+        self.strong = self.weak = self.tied = np.zeros(len(self.b), dtype=bool)
+        self.tie: Lexicographic | None = self._tie()
+
+    def _tie(self) -> Lexicographic | None:
+        """What decides the forces that no cost sees; None where there are none.
+
+        Raises:
+            UndeterminedWrenchError: there are, and the criterion has no tie-break.
+        """
+        curvature = self.program.curvature
+        if not len(curvature) or curvature[0] > _SINGULAR * curvature[-1]:
+            return None
+        second = self.criterion.tie_break
+        if second is None:
+            raise UndeterminedWrenchError(
+                f"criterion {self.criterion.name!r} leaves wrenches undetermined. Give it a "
+                "tie_break such as minimum_wrench(1.0), or a small share of another criterion: "
+                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
+            )
+        self.second: Quadratic = second.at(self.stance)
+        if self.second.inertia:
+            raise InvalidInputError(
+                f"criterion {second.name!r} follows the inertia and cannot be a tie-break. Use "
+                "minimum_wrench, minimum_torque or constant weights."
+            )
+        H, g = self.second.over_forces(self.load)
+        values, vectors = self.program.modes
+        free = values <= _SINGULAR * values[-1]
+        return Lexicographic(self.program, self.program.null @ vectors[:, free], H, g)
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Forces, multipliers of the base's balance and of the rows, slack."""
-        program = self.program
-        curvature = program.curvature
-        if len(curvature) and curvature[0] <= _SINGULAR * curvature[-1]:
-            raise UndeterminedWrenchError(
-                f"criterion {self.criterion.name!r} leaves wrenches undetermined, and limits with "
-                "a tie-break are not supported. Add a small share of another criterion: "
-                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
-            )
+        tied = np.zeros(0, dtype=int)
         try:
-            found = program.solve()
+            if self.tie is None:
+                found = self.program.solve()
+            else:
+                chosen = self.tie.solve(_PRESSING)
+                found, tied = chosen.first, chosen.tied
         except NoPointError as error:
             demands = dict.fromkeys(self.names[i] for i in error.rows)
             raise InfeasibleError(error.violation, tuple(demands)) from None
@@ -319,8 +350,10 @@ class _Problem:
         gradient = max(float(np.abs(self.H.dot(f) - self.g).max()), 1e-300)
         touching = slack <= _TOUCHING * self.weight * self.scale
         self.strong = multipliers * self.scale > _PRESSING * gradient
-        self.weak = touching & ~self.strong
         multipliers[~self.strong] = 0.0
+        self.tied = np.isin(np.arange(len(self.b)), tied) & ~self.strong
+        self.strong = self.strong | self.tied
+        self.weak = touching & ~self.strong
         slack[self.strong] = 0.0
         return f, found.equality, multipliers, slack
 
@@ -363,7 +396,11 @@ class _Problem:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows along V, with these rows held."""
         base, joints, change, bound = self.rates_of_data(at, V, load_rate)
-        df, _, dl = self.program.hold(held, change, base, bound[held])
+        if self.tie is None:
+            df, _, dl = self.program.hold(held, change, base, bound[held])
+        else:
+            df, _, dl = self.tie.hold(held, change, base, bound[held])
+            df = df + self.tie.choose(held, self._second_change(at, V, held, joints, df))
         return df, joints - self.load.joint_map.dot(df), dl
 
     def rates_of_data(
@@ -387,9 +424,47 @@ class _Problem:
         bound[torque] = -self.sign[torque, None] * joints[self.joint[torque]]
         return base, joints, change, bound
 
+    def _second_change(
+        self,
+        at: ConstrainedEquilibrium,
+        V: np.ndarray,
+        held: np.ndarray,
+        joints: np.ndarray,
+        df: np.ndarray,
+    ) -> np.ndarray:
+        """How the tie-break's gradient changes along V, what its multipliers take up left out.
+
+        At the optimum H2 f - g2 = E w - H y - A_a' l for some w, y, l. That stays so along V, and
+        F_a' [E  H  A_a'] = 0 removes the unknown derivatives of these; as `kkt.TieBreak` does it.
+        """
+        tie, robot = self.tie, self.stance.robot
+        assert tie is not None
+        still = np.zeros(self.program.E.shape[1])
+        pull = tie.g - tie.H.dot(at.forces)
+        w, y, l = self._adjoint(held, pull, still)
+        W2 = self.second.torque_weight(self.load)
+        turn = np.zeros(self.nb + len(self.load.torque_offset))
+        turn[: self.nb] = -w
+        turn[self.nb :] = self.W.dot(self.load.joint_map.dot(y)) - W2.dot(at.torques)
+        torque = self.joint[held] >= 0
+        on = held[torque]
+        np.add.at(turn, self.nb + self.joint[on], -self.sign[on] * l[torque])
+        change = self.stance.motion_derivative(robot.from_drives(turn)).dot(V)
+        change -= self.load.joint_map.T.dot(W2.dot(joints))
+        return np.asarray(change + tie.H.dot(df))
+
+    def _adjoint(
+        self, held: np.ndarray, pull: np.ndarray, still: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        assert self.tie is not None
+        y, w, l = self.tie.hold(held, pull, still, np.zeros(len(held)))
+        return w, y, l
+
     def rates(self, at: ConstrainedEquilibrium, v: np.ndarray) -> Rates:
         """The one-sided derivative: minimise 1/2 df' H df - c' df with what presses held."""
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
+        if self.tie is not None:
+            return self._tied_rates(at, v, strong, weak)
         base, joints, c, bound = (x[:, 0] for x in self.rates_of_data(at, v[:, None]))
         E = np.hstack([self.load.base_map.T, self.A[strong].T])
         e = np.concatenate([base, bound[strong]])
@@ -413,3 +488,40 @@ class _Problem:
         slack[strong] = 0.0
         slack[multipliers != 0] = 0.0
         return Rates(df, joints - self.load.joint_map @ df, multipliers, slack)
+
+    def _tied_rates(
+        self, at: ConstrainedEquilibrium, v: np.ndarray, strong: np.ndarray, weak: np.ndarray
+    ) -> Rates:
+        """The one-sided derivative where a tie-break decides, and nothing is only touched."""
+        if len(weak):
+            raise InvalidInputError(
+                "what is touched at this very posture leaves it to the tie-break on which side "
+                f"the wrenches go ({', '.join(self.names[i] for i in weak)}). Move a little along "
+                "the path."
+            )
+        df, torques, dl = (x[:, 0] for x in self.differentiate(at, v[:, None], strong))
+        multipliers = np.zeros(len(self.b))
+        multipliers[strong] = dl
+        multipliers[self.tied] = 0.0
+        bound = self.rates_of_data(at, v[:, None])[3][:, 0]
+        slack = bound - self.A.dot(df)
+        slack[strong] = 0.0
+        return Rates(df, torques, multipliers, slack)
+
+    def check_followed(self, rows: np.ndarray, multipliers: np.ndarray) -> None:
+        """Reject rows on which the tie-break alone may press: its easing is not followed.
+
+        Raises:
+            InvalidInputError: there are such rows.
+        """
+        if self.tie is None:
+            return
+        seen = np.linalg.norm(self.A[rows] @ self.tie.free, axis=1) > _PRESSING * self.scale[rows]
+        alone = rows[seen & (multipliers[rows] == 0.0)]
+        if len(alone):
+            raise InvalidInputError(
+                "the tie-break alone presses on "
+                f"{', '.join(self.names[i] for i in alone)}, and when it lets go is not followed. "
+                "Give the criterion a small share of another instead: mixed((criterion, 1.0), "
+                "(minimum_wrench(1.0), 1e-3))."
+            )

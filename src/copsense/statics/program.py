@@ -125,6 +125,12 @@ class Program(ShortRepr):
         """Eigenvalues of the cost over the null space, rising."""
         return np.asarray(np.linalg.eigvalsh(self._reduced_cost))
 
+    @property
+    def modes(self) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, "z z"]]:
+        """The same with their eigenvectors, coordinates over `null`."""
+        values, vectors = np.linalg.eigh(self._reduced_cost)
+        return np.asarray(values), np.asarray(vectors)
+
     def solve(self) -> Optimum:
         """The optimum.
 

@@ -84,6 +84,9 @@ class BatchKernel:
         served = kernel_criteria(stance, self.criteria)
         self._serves_all = len(served.column) == len(self.criteria)
         self.fallback_reason = why_not_covered(stance)
+        lines = [c.name for c in stance.contacts if c.sole is not None and len(c.sole) == 2]
+        if not self.fallback_reason and lines:
+            self.fallback_reason = f"the sole of {lines[0]} is a line"
         if not self.fallback_reason and not len(served.column):
             self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
         if not self.fallback_reason:
