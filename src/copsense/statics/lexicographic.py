@@ -22,7 +22,9 @@ from copsense.errors import UndeterminedWrenchError, UnsolvedError
 from copsense.statics.program import Optimum, Program
 
 _PROXIMAL = 1e-6  # curvature of a proximal step, relative to the cost's largest
-_STEPS = 60  # each leaves that share of what was left
+_FARTHEST = 1e-12  # the least that a step is made to curve, likewise
+_STEPS = 60
+_EXACT = 1e-3  # of the tolerance: an optimum that good needs no further step
 _SETTLED = 1e-11  # of the unit: steps shorter than that are none
 _NULL = 1e-10  # curvature of the second cost, relative, that leaves forces undetermined
 _BLIND = 1e-9  # share of a row that F must leave for it to limit z
@@ -89,10 +91,7 @@ class Lexicographic:
             UnsolvedError: no x was found that meets the optimality conditions.
         """
         program = self.program
-        first = self._first()
-        gradient = max(float(np.abs(program.H @ first.x - program.g).max()), 1e-300)
-        strong = np.flatnonzero(first.multipliers * program.scale > pressing * gradient)
-        first = self._polished(first, strong)
+        first, strong = self._first(pressing)
         # Where the first cost presses, z may not lead away: A_s F z = 0.
         G = self._left_free(strong)
         slack = np.maximum(program.b - program.A @ first.x, 0.0)
@@ -114,20 +113,39 @@ class Lexicographic:
         slope = np.abs(G.T @ (self.H @ there.x - self.g)).max()
         return TiedOptimum(there, seen[second.multipliers > pressing * slope])
 
-    def _first(self) -> Optimum:
-        """An optimum of the first cost."""
+    def _first(self, pressing: float) -> tuple[Optimum, Int[np.ndarray, " a"]]:
+        """An optimum of the first cost, and the rows that press there."""
         program, F, step = self.program, self.free, _PROXIMAL * self._size
-        H, x = program.H + step * F @ F.T, program.start
-        for _ in range(_STEPS):
-            g = program.g + step * F @ (F.T @ x)
-            near = Program(H, g, program.E, program.e, program.A, program.b, program.unit).solve()
+        best: Optimum | None = None
+        x = program.start
+        for k in range(_STEPS):
+            H, g = program.H + step * F @ F.T, program.g + step * F @ (F.T @ x)
+            try:
+                near = Program(
+                    H, g, program.E, program.e, program.A, program.b, program.unit
+                ).solve()
+            except UnsolvedError:
+                if best is None:
+                    raise
+                break  # as flat as rounding lets it be
+            found = self._polished(near, self._pressing(near, pressing))
+            if best is None or found.error < best.error:
+                best = found
             moved, x = float(np.abs(F.T @ (near.x - x)).max()), near.x
-            if moved <= _SETTLED * program.unit:
+            if found.error <= _EXACT * program.tolerance or moved <= _SETTLED * program.unit:
                 break
-        error = program.violation(near.x, near.equality, near.multipliers)
-        if error > program.tolerance:
-            raise UnsolvedError(error)
-        return Optimum(near.x, near.equality, near.multipliers, error)
+            if k:  # slow where the cost itself is nearly as flat: step farther
+                step = max(step / 10, _FARTHEST * self._size)
+        assert best is not None
+        if best.error > program.tolerance:
+            raise UnsolvedError(best.error)
+        # Not those that only the steps pulled against.
+        return best, self._pressing(best, pressing)
+
+    def _pressing(self, at: Optimum, pressing: float) -> Int[np.ndarray, " a"]:
+        program = self.program
+        gradient = max(float(np.abs(program.H @ at.x - program.g).max()), 1e-300)
+        return np.flatnonzero(at.multipliers * program.scale > pressing * gradient)
 
     def _polished(self, near: Optimum, strong: Int[np.ndarray, " a"]) -> Optimum:
         """The same with the last proximal step's own pull taken out."""
@@ -137,7 +155,10 @@ class Lexicographic:
         l = np.zeros(len(program.b))
         l[strong] = pressing
         error = program.violation(x, nu, l)
-        return Optimum(x, nu, l, error) if error <= near.error else near
+        own = program.violation(near.x, near.equality, near.multipliers)
+        if error <= own:
+            return Optimum(x, nu, l, error)
+        return Optimum(near.x, near.equality, near.multipliers, own)
 
     def optimum(self, held: Int[np.ndarray, " a"]) -> Optimum:
         """The optimum with these independent rows held, whatever the others say."""
