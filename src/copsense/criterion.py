@@ -26,11 +26,20 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.quadratic import Quadratic
 from copsense.robot import Robot
 from copsense.stance import Stance
-from copsense.terms import TorqueTerm, TorqueWeights, WrenchTerm, WrenchWeights, quadratic_sum
+from copsense.terms import (
+    PreloadTerm,
+    Term,
+    TorqueTerm,
+    TorqueWeights,
+    WrenchTerm,
+    WrenchWeights,
+    quadratic_sum,
+)
 
 __all__ = [
     "CRITERIA",
     "Criterion",
+    "PreloadTerm",
     "Quadratic",
     "TorqueTerm",
     "TorqueWeights",
@@ -46,7 +55,7 @@ __all__ = [
 ]
 
 
-_TERMS = (TorqueTerm, WrenchTerm)
+_TERMS = (TorqueTerm, WrenchTerm, PreloadTerm)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,7 +71,7 @@ class Criterion(ByContent):
     """
 
     name: str
-    terms: tuple[TorqueTerm | WrenchTerm, ...]
+    terms: tuple[Term, ...]
     tie_break: Criterion | None = None
 
     def __post_init__(self) -> None:
@@ -145,7 +154,7 @@ class Criterion(ByContent):
         return cls(name, terms, None if tie is None else cls.from_dict(tie))
 
 
-def _term(data: object) -> TorqueTerm | WrenchTerm:
+def _term(data: object) -> Term:
     """The term that its `to_dict` wrote."""
     if not isinstance(data, Mapping):
         raise InvalidInputError(f"{data!r} is not a term of a criterion. Give a table of its keys.")
@@ -161,7 +170,14 @@ def _term(data: object) -> TorqueTerm | WrenchTerm:
             what = "the reference of a wrench term"
             rest["reference"] = finite_array(rest["reference"], what, (None, 6))
         return WrenchTerm(**rest)
-    raise UnknownNameError("kind of term of a criterion", str(kind), ("torque", "wrench"))
+    if kind == "preload":
+        _known(rest, ("displacement", "scale"), "a preload term")
+        if "displacement" not in rest:
+            raise InvalidInputError("a preload term has no displacement. Give six numbers each.")
+        return PreloadTerm(**rest)
+    raise UnknownNameError(
+        "kind of term of a criterion", str(kind), ("torque", "wrench", "preload")
+    )
 
 
 def _known(data: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:

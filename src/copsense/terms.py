@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 import numpy as np
@@ -26,10 +27,11 @@ class TorqueTerm(ByContent):
     """1/2 scale tau' W tau.
 
     Attributes:
-        weights: a number for every joint; joint name -> number (others 0); a vector (n,); a
-            symmetric positive-definite matrix (n, n); ``"1/limit^2"`` for the model's effort
-            limits; or ``"inverse inertia"`` for the inverse of the joint block of M(q), which
-            depends on which link is the model's base.
+        weights: a number for every joint; joint name -> number, a name with a star being of every
+            joint that it fits, ``"*hip*"``, and a star alone of the rest (others 0); a vector
+            (n,); a symmetric positive-definite matrix (n, n); ``"1/limit^2"`` for the model's
+            effort limits; or ``"inverse inertia"`` for the inverse of the joint block of M(q),
+            which depends on which link is the model's base.
         scale: factor of the term, positive.
     """
 
@@ -88,9 +90,45 @@ class WrenchTerm(ByContent):
         return found
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class PreloadTerm(ByContent):
+    """e' f: a command that would have the contacts where the ground does not let them be.
+
+    Beside the elastic energy of the joints (`copsense.stiffness`). A foot that is commanded lower
+    pushes harder.
+
+    Attributes:
+        displacement: e, of each contact's commanded place from where it stands: six numbers by
+            contact name (others 0), or (nc, 6), along and about the contact's axes [m, rad].
+        scale: factor of the term, positive.
+    """
+
+    displacement: Mapping[str, ArrayLike] | ArrayLike
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Own the displacement."""
+        object.__setattr__(self, "displacement", own(self.displacement))
+
+    def _fields(self) -> tuple[object, ...]:
+        return self.displacement, self.scale
+
+    def __repr__(self) -> str:
+        """The displacement, and the scale where it is not one."""
+        return f"PreloadTerm({show(self.displacement)}{_show_scale(self.scale)})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as in `Criterion.to_dict`."""
+        found = plain(self.displacement)
+        return {"kind": "preload", "displacement": found, "scale": float(self.scale)}
+
+
+Term = TorqueTerm | WrenchTerm | PreloadTerm
+
+
 def quadratic_sum(
     criterion: str,
-    terms: Sequence[TorqueTerm | WrenchTerm],
+    terms: Sequence[Term],
     robot: Robot,
     contacts: Sequence[Contact],
 ) -> Quadratic:
@@ -110,7 +148,9 @@ def quadratic_sum(
     torque, inertia = np.zeros((nj, nj)), 0.0
     wrench, pull = np.zeros((m, m)), np.zeros(m)
     for term in terms:
-        if isinstance(term, WrenchTerm):
+        if isinstance(term, PreloadTerm):
+            pull -= term.scale * _displacement(criterion, term.displacement, contacts)
+        elif isinstance(term, WrenchTerm):
             W = term.scale * _wrench_matrix(criterion, term, contacts)
             wrench += W
             if term.reference is not None:
@@ -142,14 +182,29 @@ def _torque_matrix(criterion: str, term: TorqueTerm, robot: Robot) -> np.ndarray
             )
         return np.diag(1.0 / limits**2)
     if isinstance(weights, Mapping):
-        for joint in weights:
-            if joint not in names:
-                raise UnknownNameError(f"joint in the weights of {criterion!r}", joint, names)
-        weights = [weights.get(joint, 0.0) for joint in names]
+        weights = _by_joint(criterion, weights, names)
     array = _as_numbers(criterion, weights)
     if array.ndim == 0:
         array = np.full(len(names), float(array))
     return _weight_matrix(criterion, "torque", array, len(names), definite=array.ndim == 2)
+
+
+def _by_joint(criterion: str, weights: Mapping[str, float], names: Sequence[str]) -> list[float]:
+    """Weights in the joints' order; a name with a star is of every joint that it fits."""
+    found: dict[str, tuple[str, float]] = {}
+    # A joint's own name before a pattern, and a pattern before the star alone.
+    for key in sorted(weights, key=lambda key: ("*" in key, key == "*")):
+        fits = [name for name in names if fnmatchcase(name, key)]
+        if not fits and key != "*":
+            raise UnknownNameError(f"joint in the weights of {criterion!r}", key, names)
+        for name in fits:
+            by, weight = found.setdefault(name, (key, weights[key]))
+            if "*" in by and by != key and key != "*" and weight != weights[key]:
+                raise InvalidInputError(
+                    f"criterion {criterion!r}: {by!r} and {key!r} both fit {name}, with different "
+                    "weights. Name the joint itself, or patterns that do not overlap."
+                )
+    return [found.get(name, ("", 0.0))[1] for name in names]
 
 
 def _wrench_matrix(criterion: str, term: WrenchTerm, contacts: Sequence[Contact]) -> np.ndarray:
@@ -218,6 +273,23 @@ def _reference(criterion: str, reference: np.ndarray, contacts: Sequence[Contact
     what = f"the reference of criterion {criterion!r}"
     shape, meaning = (len(contacts), 6), "fx, fy, fz, mx, my, mz of each contact"
     return _stack(finite_array(reference, what, shape, meaning), contacts)
+
+
+def _displacement(
+    criterion: str, displacement: Mapping[str, ArrayLike] | ArrayLike, contacts: Sequence[Contact]
+) -> np.ndarray:
+    what = f"the preload of criterion {criterion!r}"
+    if isinstance(displacement, Mapping):
+        names = [contact.name for contact in contacts]
+        for name in displacement:
+            if name not in names:
+                raise UnknownNameError(f"contact in the preload of {criterion!r}", name, names)
+        rows = [_as_numbers(criterion, displacement.get(name, np.zeros(6))) for name in names]
+        if any(row.shape != (6,) for row in rows):
+            raise InvalidInputError(f"{what} is not six numbers [m, rad] for each contact.")
+        return _stack(rows, contacts)
+    shape, meaning = (len(contacts), 6), "x, y, z [m] and turns about them [rad] of each contact"
+    return _stack(finite_array(displacement, what, shape, meaning), contacts)
 
 
 def _stack(wrenches: Iterable[np.ndarray], contacts: Sequence[Contact]) -> np.ndarray:

@@ -28,7 +28,7 @@ def _skeleton(robot):
 class MujocoRobot:
     """MuJoCo: the free joint's velocity is linear in world axes, angular in the base's."""
 
-    def __init__(self, robot):
+    def __init__(self, robot, prepare=lambda spec: None):
         root = _skeleton(robot)
         options = ET.SubElement(root, "mujoco")
         # Massless links, soles among them, keep their frames only if bodies are not fused.
@@ -37,6 +37,7 @@ class MujocoRobot:
         spec.option.gravity = [0.0, 0.0, -9.81]
         base = spec.worldbody.first_body()
         base.add_freejoint()
+        prepare(spec)
         self.robot, self.model = robot, spec.compile()
         assert not self.model.dof_armature.any()
         self.data = mujoco.MjData(self.model)

@@ -33,7 +33,8 @@ def _options(how_many: str) -> list[Callable[[Any], Any]]:
             multiple=True,
             metavar="NAME",
             help="How the load is shared: minimum-wrench, minimum-torque, limit-weighted-torque, "
-            f"inertia-weighted-torque or minimum-tangential. {how_many}",
+            f"inertia-weighted-torque, minimum-tangential, or of a robot on position servos "
+            f"stiffness:hip=4000,ankle=1000,rest=2000 [Nm/rad], soles mx=2800,my=700. {how_many}",
         ),
         click.option(
             "--characteristic-length",
@@ -49,9 +50,15 @@ def _options(how_many: str) -> list[Callable[[Any], Any]]:
 def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
     """The criteria named, or the paper's two."""
     from copsense.criterion import criterion_named
+    from copsense.stiffness import COMMAND_LINE, stiffness_named
 
     file = remembered_stance()
     if not names and file is not None and file.criteria:
         return list(file.criteria)
     chosen = dict.fromkeys(names or ("minimum-wrench", "minimum-torque"))
-    return [criterion_named(name, characteristic_length) for name in chosen]
+    return [
+        stiffness_named(name)
+        if name.partition(":")[0] == COMMAND_LINE
+        else criterion_named(name, characteristic_length)
+        for name in chosen
+    ]
