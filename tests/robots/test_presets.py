@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import copsense
+from copsense import load_stance
+from copsense.robots.presets import shared_presets
 
 BIPEDS = {"icub", "talos", "romeo", "g1", "human"}
 
@@ -68,6 +70,19 @@ def test_locked_joints_keep_their_mass(icub):
     assert len(icub.robot.joint_names) == 23
     assert icub.robot.mass == pytest.approx(whole.mass, rel=1e-12)
     assert icub.robot.model.nv == 29
+
+
+def test_a_robot_is_read_once_where_it_is_shared_and_afresh_elsewhere():
+    kept = {}
+    with shared_presets(kept):
+        here, lowered = load_stance("four_bar"), load_stance("four_bar")
+        with shared_presets():
+            assert load_stance("four_bar").robot is not here.robot
+        assert load_stance("four_bar").robot is here.robot
+    assert here.robot is lowered.robot is kept["four_bar"]
+    assert load_stance("four_bar").robot is not here.robot
+    with shared_presets(kept):
+        assert load_stance("four_bar").robot is here.robot
 
 
 def test_a_contact_that_the_user_placed_stays_there():

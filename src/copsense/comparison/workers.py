@@ -14,6 +14,8 @@ from threadpoolctl import threadpool_limits
 
 from copsense.comparison.case import Case
 from copsense.comparison.score import Score, failed
+from copsense.robot import Robot
+from copsense.robots.presets import shared_presets
 
 # The matrices are small: more BLAS threads cost time, and change the order of sums.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -25,9 +27,12 @@ def run_here(
     cases: Sequence[Case], run: Run, progress: Callable[[Case, float], object]
 ) -> Iterator[tuple[Case, list[Score]]]:
     """Run cases in this process, in turn."""
+    robots: dict[str, Robot] = {}
     with threadpool_limits(limits=1, user_api="blas"):
         for case in cases:
-            yield case, run(case, lambda seconds, case=case: progress(case, seconds))  # type: ignore[misc]
+            with shared_presets(robots):
+                scores = run(case, lambda seconds, case=case: progress(case, seconds))  # type: ignore[misc]
+            yield case, scores
 
 
 def run_in_processes(
@@ -109,7 +114,7 @@ class _Worker:
 def _work(link: Any, run: Run) -> None:
     """Answer cases with their scores until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
-    with threadpool_limits(limits=1, user_api="blas"):
+    with threadpool_limits(limits=1, user_api="blas"), shared_presets():
         try:
             while True:
                 link.send(run(link.recv(), link.send))

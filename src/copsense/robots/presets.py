@@ -5,7 +5,9 @@ from __future__ import annotations
 import importlib.util
 import math
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -287,16 +289,41 @@ _LISTED = (
 PRESETS: dict[str, Preset] = {preset.name: preset for preset in _LISTED}
 
 
+_SHARED: ContextVar[dict[str, Robot] | None] = ContextVar("shared presets", default=None)
+
+
+@contextmanager
+def shared_presets(kept: dict[str, Robot] | None = None) -> Iterator[None]:
+    """Inside, a preset's robot and the meshes of its feet are read once.
+
+    For code that loads the same robot again and again, and changes no model that it is given.
+
+    Args:
+        kept: name -> robot, filled here, to go on with in another such block.
+    """
+    token = _SHARED.set({} if kept is None else kept)
+    try:
+        yield
+    finally:
+        _SHARED.reset(token)
+
+
 def preset_robot(preset: Preset) -> Robot:
-    """Build a preset's robot.
+    """Build a preset's robot, or give the one that `shared_presets` keeps.
 
     Raises:
         MissingExtraError: the package that holds it is not installed.
         ModelLoadError: the installed package has no such file.
     """
+    shared = _SHARED.get()
+    if shared is not None and preset.name in shared:
+        return shared[preset.name]
     try:
-        return preset.load()
+        robot = preset.load()
     except FileNotFoundError as error:
         raise ModelLoadError(
             f"robot {preset.name!r} is not in the installed package: {error}"
         ) from None
+    if shared is not None:
+        shared[preset.name] = robot
+    return robot

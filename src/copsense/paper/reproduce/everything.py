@@ -30,6 +30,7 @@ from copsense.paper.reproduce.sideways import (
 )
 from copsense.paper.reproduce.within_limits import solve_within_limits
 from copsense.robots import load_stance
+from copsense.robots.presets import shared_presets
 from copsense.stance import Stance
 from copsense.statics import solve_equilibrium
 
@@ -70,7 +71,9 @@ def reproduce_paper(
         raise InvalidInputError(
             "the report tells limits that are alike at every contact and joint. Give numbers."
         )
-    clock, stance = Clock(progress), load_stance(ROBOT)
+    clock = Clock(progress)
+    with shared_presets():
+        stance, lowered = load_stance(ROBOT), load_stance(ROBOT, contact_at="sole")
     for criterion in paper_criteria():
         solve_equilibrium(stance, criterion, limits)  # rejects limits that forbid it, at once
     with clock.stage("four-bar"):
@@ -78,7 +81,6 @@ def reproduce_paper(
         figures = tuple(f(four_bar) for f in (figure_3a, figure_3b, figure_4, figure_5))
         claims = evaluate_four_bar_claims(four_bar)
         errata = evaluate_errata(four_bar)
-    lowered = load_stance(ROBOT, contact_at="sole")
     lateral, path = sweep_sideways(stance, postures, clock, "iCub")
     at_sole, _ = sweep_sideways(lowered, postures, clock, "iCub, sole's bottom")
     within = solve_within_limits(stance, path, limits, clock)
