@@ -60,7 +60,7 @@ def test_measured_cops_are_the_static_ones_but_for_the_acceleration(sway):
 
 
 def test_the_report_says_how_often_torques_are_commanded(sway):
-    assert sway_rates(sway) == {"control": "500", "physics": "1000"}
+    assert sway_rates(sway) == {"control": "250", "physics": "1000"}
 
 
 def test_claims_fail_on_other_recordings(sway):

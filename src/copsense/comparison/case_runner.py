@@ -73,9 +73,19 @@ class CaseRunner:
         *,
         until: Literal["tip", "fall"] = "tip",
         push: Push | None = None,
+        record_period: float = 5e-3,
         **changes: Any,
     ) -> Recording:
         """One run in the case's conditions, with a push or changed fields added.
+
+        Args:
+            reference: what it follows.
+            duration: how long [s].
+            until: what ends it early, as in `rollout`.
+            push: beside those of the conditions.
+            record_period: time between two rows [s]; how and where a run ends does not depend on
+                it.
+            changes: fields of the scenario.
 
         Raises:
             ControllerError: the controller failed during the run, so nothing was measured.
@@ -90,6 +100,7 @@ class CaseRunner:
             self.make_controller(),
             scenario,
             until=until,
+            record_period=record_period,
             progress=None if tick is None else lambda n: tick(n * scenario.control_period),
         )
         if run.attrs["end_kind"] == "controller":

@@ -23,6 +23,7 @@ from copsense.statics import solve_equilibrium
 
 _START = 0.2  # s before a push
 _AFTER = 1.0  # s to watch after a push
+_ROWS = 0.1  # s between the rows of runs of which only the end is scored
 _FASTEST = 0.5  # m/s of the CoM: any larger push tips a contact
 
 
@@ -46,7 +47,7 @@ def _lean(trial: Lean, runner: CaseRunner) -> list[Score]:
     reference, reach = runner.lean(trial.reach, trial.speed, sign)
     expected, note = runner.statics(reference)
     ramp = reference.signal
-    run = runner.run(reference, ramp.duration + 0.5)  # type: ignore[attr-defined]
+    run = runner.run(reference, ramp.duration + 0.5, record_period=_ROWS)  # type: ignore[attr-defined]
     tipped = bool(run.attrs["tip_contact"])
     tip = abs(float(run["tip_com"].sel(com_axis="y")) - float(runner.stance.com[1]))
     reason = _and(str(run.attrs["end_reason"]), note)
@@ -120,7 +121,9 @@ def _push(trial: PushToTip, runner: CaseRunner) -> list[Score]:
     def survives(impulse: float) -> bool:
         force = (0.0, sign * impulse / trial.duration, 0.0)
         push = Push(force, start=_START, duration=trial.duration)
-        run = runner.run(reference, _START + trial.duration + _AFTER, push=push)
+        run = runner.run(
+            reference, _START + trial.duration + _AFTER, push=push, record_period=_ROWS
+        )
         if not run.completed:
             tips[impulse] = run
         return run.completed
@@ -175,6 +178,7 @@ def _falls(trial: Falls, runner: CaseRunner) -> list[Score]:
             start + trial.duration + trial.watch,
             until="fall",
             push=push,
+            record_period=_ROWS,
             noise=noise,
             seed=int(draw.integers(2**31)),
         )
@@ -208,7 +212,7 @@ def _breaking(trial: Breaking, runner: CaseRunner) -> list[Score]:
             changes = {"motors": replace(motors, limit=limit)}
         else:
             changes = {"motors": replace(motors, **{trial.parameter: value})}
-        run = runner.run(reference, 1.0 / trial.frequency, **changes)
+        run = runner.run(reference, 1.0 / trial.frequency, record_period=_ROWS, **changes)
         runs[value] = run
         return run.completed
 

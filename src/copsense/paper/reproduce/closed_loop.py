@@ -13,8 +13,8 @@ from copsense.simulation import MujocoSimulator, Recording, Scenario, rollout
 from copsense.simulation.prediction import farther_side, predict, predict_lean
 from copsense.stance import Stance
 
-# s between two commands, of two physics steps: the robot's own loops run at 100 Hz to 1 kHz.
-CONTROL_PERIOD = 2e-3
+# s between two commands, of four physics steps: the robot's own loops run at 100 Hz to 1 kHz.
+CONTROL_PERIOD = 4e-3
 _RECORD = 0.02  # s between recorded rows
 _FARTHER = 1.5  # amplitudes: as far a lean is followed to its first edge
 
