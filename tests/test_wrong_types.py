@@ -11,8 +11,8 @@ NO_PATH = "is not a path of postures. Make one with copsense.lateral_sweep"
 NO_PAIR = "is not a criterion with its factor. Give pairs, one by one: mixed((minimum_torque()"
 NO_POSITIONS = 'Give joint -> position, such as {"l_knee": -0.35}'
 
-# Call -> what the error says. In the calls: s a stance, p a path, mt a criterion, pol a policy, L
-# limits, scan a PathScan, swept a Sweep, grid a sampling.
+# Call -> what the error says. In the calls: s a stance, p a path, mt and one criteria, pol a
+# policy, L limits, scan a PathScan, swept a Sweep, grid a sampling.
 CALLS = {
     "analyse(s, pol)": "criteria is a single policy. Give a list",
     "analyse(s, mt)": "criteria is a single criterion. Give a list",
@@ -130,6 +130,55 @@ CALLS = {
     "swept.subset(postures=[99])": "postures is [99]. Give a list of positions from 0 to 2",
     "swept.subset(postures=['a'])": "postures is ['a']. Give a list of positions from 0 to 2",
     "balance(s, gains=3)": "3 is not a set of gains. Give STIFF",
+    "Drives(3)": "3 is not a list of names. Give a list of names, such as ['l_knee']",
+    "Drives(motors=[3])": "3 is not a name",
+    "Drives(motors='l_knee')": "'l_knee' is not a list of names",
+    "Drives(springs=3)": "3 is not a mapping of springs. Give joint -> Spring(",
+    "Drives(springs={3: Spring(1.0)})": "the joint of a spring or held torque is 3. Give a text",
+    "Drives(held=3)": "3 is not a mapping of held torques. Give joint -> torque",
+    "Drives(couplings=3)": "3 is not a list of couplings. Give Coupling(",
+    "Drives(couplings=[3])": "3 is not a coupling. Give Coupling(",
+    "Drives(loops=['a'])": "'a' is not a loop. Give Loop(",
+    "Drives(transmissions=3)": "3 is not a list of transmissions. Give Transmission(",
+    "Coupling('a', 4)": "what joint 'a' is coupled to is 4. Give a text",
+    "Loop('a', 4)": "frame_b of a loop is 4. Give a text",
+    "Transmission(1, 2, 3)": "1 is not a list of names",
+    "Transmission('m', 'j', [[1]])": "'m' is not a list of names",
+    "Transmission(('m',), ('j',), [[1]], ('a',))": "the effort limits of m is not an array",
+    "Drives().keeping(3)": "3 is not a list of names",
+    "s.robot.keeping(3)": "3 is not a list of names. Give joints",
+    "Robot(3, 4)": "4 is not a pin.Model. Give what pin.buildModelFromUrdf(",
+    "Payload(3, 4)": "the frame of a payload is 3. Give a text",
+    "s.with_loads(3)": "3 is not a load. Give copsense.Load(frame, force)",
+    "load_stance('solo12', contacts=3)": "3 is not a list of contacts. Give frames or contacts",
+    "load_stance('solo12', passive=3)": "3 is not a list of names",
+    "PosturePath(1, 2, 3, 4, 5)": "1 is not a list of stances. Give one or more stances",
+    "PosturePath((), 'y', 'm', [], [])": "a path holds no stance",
+    "PosturePath((3,), 'y', 'm', [0], 3)": "3 is not a stance",
+    "PosturePath((s,), 3, 'm', [0], 3)": "the coordinate of a path is 3. Give a text",
+    "PosturePath((s,), 'y', 'm', 'a', 3)": "values of a path is not an array of numbers",
+    "PosturePath((s,), 'y', 'm', [0], 3)": "tangents of a path has shape (). Give finite",
+    "PosturePath((s,), 'y', 'm', [0, 1], 3)": "values of a path has shape (2,). Give finite",
+    "Scenario(pushes=[3])": "3 is not a push. Give Push(",
+    "Scenario(friction=3)": "3 is not a list of friction changes. Give FrictionChange(",
+    "Scenario(motors=3)": "3 is not a scenario's motors. Give copsense.simulation.Motors(",
+    "Motors(limit=[1])": "the torque limit [Nm] is [1]. Give a positive finite number",
+    "ModelError(payload=3)": "3 is not a mapping of payloads. Give frame -> mass",
+    "Push((1, 2, 3), frame=3)": "the frame of a push is 3. Give a text",
+    "public_gains(3)": "3 is not a robot. Give stance.robot",
+    "PathReference(3, Hold())": NO_PATH,
+    "PathReference(p, 3)": "3 is not a signal. Give Hold(), Sine(",
+    "lateral_reference('icub', Hold())": NO_STANCE,
+    "lateral_reference(s, 3)": "3 is not a signal",
+    "MujocoSimulator('icub')": NO_STANCE,
+    "MujocoSimulator(s, 3)": "3 is not a value of PhysicsSettings. Give",
+    "rollout(3, BalancingController(s, one), Scenario())": "3 is not a simulator. Give Mujoco",
+    "rollout(MujocoSimulator(s), BalancingController(s, one), 3)": "3 is not a scenario. Give",
+    "load_controller(3, s)": "the source of a controller is 3. Give a text",
+    "BalancingController(s, mt, share=3)": "3 does not share a load. Give a function",
+    "BalancingController(s, mt, name=3)": "the name of a controller is 3. Give a text",
+    "Grid(3)": "3 is not a list of coordinates. Give Axis(",
+    "Axis(3, 0, 1, 2)": "the name of a coordinate is 3. Give a text",
 }
 # What stays as it was: a family by its name, a criterion out of many, none at all.
 ACCEPTED = (
@@ -137,6 +186,7 @@ ACCEPTED = (
     "swept.subset(['minimum-torque'], [-1, 0])",
     "com_regions(s, [], L)",
     "Stance(s.robot, s.q, s.contacts[0], check=False)",
+    "Drives(loops=Loop('a', 'b'))",
     "Contact('l_sole', friction=np.float32(0.5))",
     "solve_equilibrium(s, pol_of_mt)",
 )
@@ -145,16 +195,22 @@ SETTING = """
 import numpy as np
 import copsense
 from copsense import *
-from copsense.controllers import BalancingController
+from copsense.controllers import *
+from copsense.drives import *
 from copsense.design import family_named
 from copsense.maps import Axis, Grid
 from copsense.pushes import push_limits
+from copsense.path import PosturePath
 from copsense.regions import com_region, criterion_region
+from copsense.robot import Payload, Robot
 from copsense.scan import limit_travel, next_active_set_change
+from copsense.simulation import *
+from copsense.simulation.disturbance import *
 
 s = copsense.load_stance("solo12")
 p = copsense.lateral_sweep(s, -0.005, 0.005, 3)
 mt, L = copsense.minimum_torque(), copsense.Limits(friction=0.5)
+one = copsense.minimum_wrench(1.0)
 def pol(q): return np.zeros((4, 6))
 def pol_of_mt(q): return copsense.solve_equilibrium(s, mt).wrenches
 scan = copsense.PathScan(p, mt)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any, TypeVar, cast, overload
 
@@ -70,6 +70,28 @@ def check_type(value: object, kind: type | tuple[type, ...], noun: str, remedy: 
     """
     if not isinstance(value, kind):
         raise InvalidInputError(f"{reprlib.repr(value)} is not {noun}. {remedy}")
+
+
+def checked_tuple(value: Any, kind: type, noun: str, remedy: str) -> tuple[Any, ...]:
+    """Values of one type as a tuple; one that is alone, and is not a text, counts as a list of it.
+
+    Args:
+        value: what the caller gave.
+        kind: the type of each.
+        noun: what the message calls one, such as ``"loop"``.
+        remedy: a sentence that says what to give.
+
+    Raises:
+        InvalidInputError: it is not a list, or holds something else.
+    """
+    if isinstance(value, kind) and kind is not str:
+        return (value,)
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        raise InvalidInputError(f"{reprlib.repr(value)} is not a list of {noun}s. {remedy}")
+    found = tuple(value)
+    for each in found:
+        check_type(each, kind, f"a {noun}", remedy)
+    return found
 
 
 def check_name(value: object, what: str) -> None:

@@ -17,11 +17,20 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from copsense.arrays import finite_array, finite_number, owned, read_only
+from copsense.arrays import (
+    check_name,
+    check_type,
+    checked_tuple,
+    finite_array,
+    finite_number,
+    owned,
+    read_only,
+)
 from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 
 LoopKind = Literal["ball", "pin", "weld"]
+_NAMES = "Give a list of names, such as ['l_knee']."
 LOOP_KINDS: tuple[LoopKind, ...] = ("ball", "pin", "weld")
 
 
@@ -61,6 +70,8 @@ class Coupling:
 
     def __post_init__(self) -> None:
         """Reject a coupling of a joint to itself, and what is not a number."""
+        check_name(self.joint, "the joint of a coupling")
+        check_name(self.of, f"what joint {self.joint!r} is coupled to")
         finite_number(self.ratio, f"the ratio of the coupling of {self.joint!r}")
         finite_number(self.offset, f"the offset of the coupling of {self.joint!r}")
         if self.joint == self.of:
@@ -94,7 +105,10 @@ class Loop:
 
     def __post_init__(self) -> None:
         """Check the kind and own the vectors."""
+        check_name(self.frame_a, "frame_a of a loop")
+        check_name(self.frame_b, "frame_b of a loop")
         object.__setattr__(self, "name", self.name or f"{self.frame_a} - {self.frame_b}")
+        check_name(self.name, "the name of a loop")
         if self.kind not in LOOP_KINDS:
             raise UnknownNameError("kind of loop", str(self.kind), LOOP_KINDS)
         for name in ("offset_a", "offset_b", "axis"):
@@ -124,8 +138,9 @@ class Transmission(ShortRepr):
 
     def __post_init__(self) -> None:
         """Check the shapes and the rank, and own the matrix."""
-        object.__setattr__(self, "motors", tuple(self.motors))
-        object.__setattr__(self, "joints", tuple(self.joints))
+        for name in ("motors", "joints"):
+            names = checked_tuple(getattr(self, name), str, "name", _NAMES)
+            object.__setattr__(self, name, names)
         what = f"the matrix of the transmission of {', '.join(self.motors)}"
         matrix = finite_array(
             self.matrix,
@@ -140,7 +155,8 @@ class Transmission(ShortRepr):
                 "told apart. Give each motor an effect of its own."
             )
         if self.effort_limits is not None:
-            limits = tuple(float(each) for each in self.effort_limits)
+            efforts = f"the effort limits of {', '.join(self.motors)}"
+            limits = tuple(finite_array(self.effort_limits, efforts, (None,)).tolist())
             if len(limits) != len(self.motors) or not all(each > 0 for each in limits):
                 raise InvalidInputError(
                     f"the effort limits of {', '.join(self.motors)} are {self.effort_limits}. Give "
@@ -173,12 +189,22 @@ class Drives(ShortRepr):
 
     def __post_init__(self) -> None:
         """Own everything, and reject what contradicts itself."""
-        if isinstance(self.motors, str):
-            raise InvalidInputError(f"the motors are {self.motors!r}. Give a list of joints.")
         if self.motors is not None:
-            object.__setattr__(self, "motors", tuple(self.motors))
-        for name in ("couplings", "loops", "transmissions"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+            object.__setattr__(self, "motors", checked_tuple(self.motors, str, "name", _NAMES))
+        kinds: dict[str, tuple[type, str]] = {
+            "couplings": (Coupling, 'Give Coupling("joint", of="leader"), or several.'),
+            "loops": (Loop, 'Give Loop("frame_a", "frame_b"), or several.'),
+            "transmissions": (Transmission, "Give Transmission(motors, joints, matrix)."),
+        }
+        for name, (kind, remedy) in kinds.items():
+            given = checked_tuple(getattr(self, name), kind, name.removesuffix("s"), remedy)
+            object.__setattr__(self, name, given)
+        remedy = 'Give joint -> Spring(stiffness, rest), such as {"l_toe": Spring(40.0)}.'
+        check_type(self.springs, Mapping, "a mapping of springs", remedy)
+        remedy = 'Give joint -> torque, such as {"neck": 0.3} [Nm].'
+        check_type(self.held, Mapping, "a mapping of held torques", remedy)
+        for joint in (*self.springs, *self.held):
+            check_name(joint, "the joint of a spring or held torque")
         object.__setattr__(self, "springs", FrozenMapping(self.springs))
         for joint, spring in self.springs.items():
             if not isinstance(spring, Spring):
@@ -215,7 +241,7 @@ class Drives(ShortRepr):
         Raises:
             InvalidInputError: a coupling or transmission would be torn apart.
         """
-        kept = set(joints)
+        kept = set(checked_tuple(joints, str, "name", _NAMES))
         tied = [{coupling.joint, coupling.of} for coupling in self.couplings]
         tied += [set(each.joints) for each in self.transmissions]
         for names in tied:
@@ -344,7 +370,7 @@ def _labels(given: Iterable[str], names: tuple[str, ...], what: str) -> list[str
     if isinstance(given, str):
         raise InvalidInputError(f"{given!r} is one name. Give a list of joints, [{given!r}].")
     found = []
-    for joint in given:
+    for joint in checked_tuple(given, str, "name", _NAMES):
         labels = [name for name in names if name == joint or name.startswith(f"{joint}[")]
         if not labels:
             raise UnknownNameError(what, joint, names)

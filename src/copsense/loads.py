@@ -15,7 +15,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense import rigid_body
-from copsense.arrays import finite_array, owned, read_only
+from copsense.arrays import check_name, finite_array, owned, read_only
 from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.rigid_body import Attachment
@@ -196,6 +196,7 @@ def _own(load: AnyLoad, vectors: dict[str, str]) -> None:
     if not isinstance(load.frame, str) or not load.frame:
         raise InvalidInputError("a load needs the frame it acts on. Give the name of a frame.")
     object.__setattr__(load, "name", load.name or load.frame)
+    check_name(load.name, "the name of a load")
     for name, unit in vectors.items():
         what = f"the {name} of load {load.name!r}"
         vector = finite_array(getattr(load, name), what, (3,), f"x, y, z {unit}")

@@ -13,7 +13,15 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import check_type, finite_number, read_only
+from copsense.arrays import (
+    check_name,
+    check_type,
+    checked_tuple,
+    finite_array,
+    finite_number,
+    read_only,
+    whole_number,
+)
 from copsense.content import freeze
 from copsense.errors import (
     CopsenseError,
@@ -58,8 +66,25 @@ class PosturePath:
     solver: PostureSolver | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        """Own the arrays and the reasons."""
-        freeze(self, "values", "tangents", "failures")
+        """Own the arrays and the reasons.
+
+        Raises:
+            InvalidInputError: no stance, or arrays of another size than stances and robot have.
+        """
+        remedy = "Give one or more stances, or make a path with copsense.lateral_sweep."
+        stances = checked_tuple(self.stances, Stance, "stance", remedy)
+        if not stances:
+            raise InvalidInputError(f"a path holds no stance. {remedy}")
+        object.__setattr__(self, "stances", stances)
+        check_name(self.coordinate, "the coordinate of a path")
+        check_name(self.unit, "the unit of a path")
+        count, nv = len(stances), stances[0].robot.model.nv
+        for name, shape in (("values", (count,)), ("tangents", (count, nv))):
+            found = finite_array(getattr(self, name), f"the array of {name} of a path", shape)
+            object.__setattr__(self, name, found)
+        remedy = "Give the index of a posture -> why it was not reached."
+        check_type(self.failures, Mapping, "a mapping of failures", remedy)
+        freeze(self, "failures")
 
     def __len__(self) -> int:
         """Number of postures."""
@@ -280,8 +305,7 @@ class LateralPath:
         check_stance(stance)
         check_at_rest(stance, "a path of postures")
         reach = finite_number(reach, "the reach [m]", positive=True)
-        if samples < 1:
-            raise InvalidInputError(f"the search needs 1 sample or more, got {samples}.")
+        samples = whole_number(samples, "the samples of a search")
         self.stance = stance
         steps = np.linspace(-reach, reach, 2 * samples + 1)
         self.values: Float[np.ndarray, " p"] = read_only(float(stance.com[1]) + steps)

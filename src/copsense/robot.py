@@ -13,7 +13,15 @@ import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
-from copsense.arrays import array_property, check_type, finite_array, finite_number, read_only
+from copsense.arrays import (
+    array_property,
+    check_name,
+    check_type,
+    checked_tuple,
+    finite_array,
+    finite_number,
+    read_only,
+)
 from copsense.description import Description, load_description
 from copsense.drives import Actuation, Drives, Spring
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
@@ -77,6 +85,8 @@ class Robot:
     def __post_init__(self) -> None:
         """Reject a model that has no floating base, or whose masses make no sense."""
         model = self.model
+        remedy = "Give what pin.buildModelFromUrdf(...) returns, or load_robot(...) a file."
+        check_type(model, pin.Model, "a pin.Model", remedy)
         if model.njoints < 2 or model.joints[1].shortname() not in _FLOATING:
             root = model.joints[1].shortname() if model.njoints > 1 else "none"
             raise InvalidInputError(
@@ -280,7 +290,7 @@ class Robot:
         Raises:
             UnknownNameError: a joint is not in the model.
         """
-        kept = set(joints)
+        kept = set(checked_tuple(joints, str, "name", 'Give joints, such as ["l_knee"].'))
         for joint in kept:
             self.joint_id(joint)
         locked = [i for i in range(2, self.model.njoints) if self.model.names[i] not in kept]
@@ -567,6 +577,12 @@ class Payload:
     frame: str
     mass: float
     com: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Reject what is not a frame, a mass and a point."""
+        check_name(self.frame, "the frame of a payload")
+        finite_number(self.mass, f"the mass of the payload at {self.frame!r} [kg]")
+        finite_array(self.com, f"the centre of the payload at {self.frame!r} [m]", (3,))
 
 
 def _build_urdf(description: Description) -> pin.Model:

@@ -744,7 +744,8 @@ def check_at_rest(stance: Stance, what: str) -> None:
 
 
 def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:
-    given = (loads,) if isinstance(loads, Load | SpringLoad) else tuple(loads)
+    alone = isinstance(loads, Load | SpringLoad) or not isinstance(loads, Iterable)
+    given: tuple[AnyLoad, ...] = (loads,) if alone else tuple(loads)  # type: ignore[assignment]
     for load in given:
         if not isinstance(load, Load | SpringLoad):
             raise InvalidInputError(

@@ -29,7 +29,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from scipy.linalg import lapack
 
-from copsense.arrays import check_type
+from copsense.arrays import check_name, check_type
 from copsense.controllers.controller import Command, Observation
 from copsense.controllers.driven import DrivenTorques
 from copsense.controllers.driven_dynamics import DrivenDynamics
@@ -39,6 +39,7 @@ from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
 from copsense.controllers.unheld import check_unheld
 from copsense.criterion import Criterion, check_criterion, minimum_wrench
+from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance, check_stance
@@ -78,6 +79,11 @@ class BalancingController:
         check_criterion(criterion)
         limits = optional_limits(limits)
         check_type(gains, Gains, "a set of gains", "Give STIFF, public_gains(robot) or Gains(...).")
+        if share is not None and not callable(share):
+            remedy = "Give a function LoadProblem -> forces, or leave it out."
+            raise InvalidInputError(f"{share!r} does not share a load. {remedy}")
+        if name is not None:
+            check_name(name, "the name of a controller")
         self.stance = stance
         self.criterion = criterion
         self.gains = gains

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_type, finite_array, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
@@ -88,6 +88,7 @@ def public_gains(robot: Robot) -> Gains:
     Args:
         robot: gives the joints; those of the legs are stiffer than torso and arms.
     """
+    check_type(robot, Robot, "a robot", "Give stance.robot, or copsense.load_robot(...).")
     stiffness = {}
     for joint in robot.torque_names:
         leg = any(word in joint for word in ("hip", "knee", "ankle", "leg"))

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from copsense.arrays import check_name
 from copsense.controllers.controller import Controller
 from copsense.errors import ControllerError, InvalidInputError, UnknownNameError
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 
 def controller_code(source: str) -> bytes:
@@ -48,6 +49,8 @@ def load_controller(source: str, stance: Stance) -> Controller:
         UnknownNameError: the module has no such attribute.
         ControllerError: it raised when called with the stance; the message says what.
     """
+    check_name(source, "the source of a controller")
+    check_stance(stance)
     given, colon, attribute = source.rpartition(":")
     if not (given and colon and attribute):
         raise InvalidInputError(

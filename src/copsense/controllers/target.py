@@ -7,6 +7,7 @@ A signal (`Hold`, `Sine`, `Ramp`) says how far along a path the robot should be 
 from __future__ import annotations
 
 import math
+import reprlib
 from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,11 +17,11 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.arrays import finite_number
+from copsense.arrays import check_type, finite_number
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.path import PosturePath, lateral_sweep
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _SPACING = 2e-3  # m between the postures of a lateral reference
 _COARSE = 10  # times as far apart are those that find out whether it can be reached
@@ -196,6 +197,9 @@ class PathReference:
             InvalidInputError: a path of fewer than two postures, or one that does not rise.
             UnreachablePostureError: the signal leaves the part of the path that can be reached.
         """
+        remedy = "Make one with copsense.lateral_sweep, joint_sweep or path_through."
+        check_type(path, PosturePath, "a path of postures", remedy)
+        _check_signal(signal)
         self.path = path
         self.signal = signal
         values = np.asarray(path.values, dtype=float)
@@ -268,6 +272,8 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     Raises:
         UnreachablePostureError: the robot cannot lean that far.
     """
+    check_stance(stance)
+    _check_signal(signal)
     low, high = signal.extent
     start, ground = float(stance.com[1]), min(p.translation[2] for p in stance.placements)
     if max(abs(low), abs(high)) > stance.com[2] - ground:
@@ -287,3 +293,12 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
                 raise UnreachablePostureError(few.failures[i])
     path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
     return PathReference(path.shifted(-start), signal)
+
+
+def _check_signal(signal: object) -> None:
+    """Reject what does not say where to be at a time, and how far it goes."""
+    if not (hasattr(signal, "at") and hasattr(signal, "extent")):
+        raise InvalidInputError(
+            f"{reprlib.repr(signal)} is not a signal. Give Hold(), Sine(amplitude, frequency) or "
+            "Ramp(distance)."
+        )

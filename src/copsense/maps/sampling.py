@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 from jaxtyping import Float
 
-from copsense.arrays import finite_number, whole_number
+from copsense.arrays import check_name, checked_tuple, finite_number, whole_number
 from copsense.errors import InvalidInputError, UnknownNameError
 
 _BITS = 30  # of SciPy's Sobol points: 2^30 of them
@@ -36,7 +36,8 @@ class Axis:
     count: int | None = None
 
     def __post_init__(self) -> None:
-        """Validate the range."""
+        """Validate the name and the range."""
+        check_name(self.name, "the name of a coordinate")
         start = finite_number(self.start, f"the start of {self.name}")
         stop = finite_number(self.stop, f"the end of {self.name}")
         count = self.count
@@ -80,8 +81,9 @@ class _Axes:
         raise NotImplementedError
 
     def _check(self, counted: bool) -> None:
-        if not isinstance(self.axes, tuple):
-            object.__setattr__(self, "axes", tuple(self.axes))
+        remedy = 'Give Axis("com_y", -0.05, 0.05, 11), or several.'
+        axes = checked_tuple(self.axes, Axis, "coordinate", remedy)
+        object.__setattr__(self, "axes", axes)
         if not self.axes or len(set(self.names)) != len(self.names):
             raise InvalidInputError(
                 f"a map needs coordinates of distinct names, got {', '.join(self.names) or 'none'}."

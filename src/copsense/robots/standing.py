@@ -12,7 +12,7 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import checked_positions, finite_array, finite_number
+from copsense.arrays import check_type, checked_positions, finite_array, finite_number
 from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
@@ -171,6 +171,8 @@ def load_stance(
     elif isinstance(contacts, str):
         raise InvalidInputError(f"contacts is one name, {contacts!r}. Give a list, [{contacts!r}].")
     else:
+        remedy = 'Give frames or contacts, such as ["l_sole", Contact("r_sole")].'
+        check_type(contacts, Iterable, "a list of contacts", remedy)
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
     own = preset.posture if preset else {}

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_name, check_type, finite_array, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.robot import Robot
@@ -36,6 +36,7 @@ class Push:
         """Validate force, start and duration."""
         force = finite_array(self.force, "the force of a push", (3,), "world x, y, z [N]")
         object.__setattr__(self, "force", tuple(float(c) for c in force))
+        check_name(self.frame, "the frame of a push")
         finite_number(self.duration, "the duration of a push [s]", positive=True)
         if finite_number(self.start, "the start of a push [s]") < 0:
             raise InvalidInputError(f"a push starts at {self.start} s. Give 0 or more.")
@@ -73,6 +74,8 @@ class Motors:
 
     def __post_init__(self) -> None:
         """Validate delay and bandwidth; limits are owned here and validated with the robot."""
+        if self.limit is not None and not isinstance(self.limit, str | Mapping):
+            finite_number(self.limit, "the torque limit [Nm]", positive=True)
         freeze(self, "limit")
         if not 0 <= finite_number(self.delay, "the delay of the motors [s]") <= 1:
             raise InvalidInputError(
@@ -152,6 +155,8 @@ class FrictionChange:
             raise InvalidInputError(
                 f"the friction of the ground is {self.friction}. Give a coefficient, 0 or more."
             )
+        if self.contact is not None:
+            check_name(self.contact, "the contact whose friction changes")
         if finite_number(self.start, "the start of a change of friction [s]") < 0:
             raise InvalidInputError(
                 f"a change of friction starts at {self.start} s. Give 0 or more."
@@ -172,6 +177,10 @@ class ModelError:
 
     def __post_init__(self) -> None:
         """Own the payload; validate the masses."""
+        remedy = 'Give frame -> mass, such as {"l_hand": 2.0} [kg].'
+        check_type(self.payload, Mapping, "a mapping of payloads", remedy)
+        for frame in self.payload:
+            check_name(frame, "the frame of a payload")
         freeze(self, "payload")
         if not finite_number(self.mass, "the error of the mass") > -1:
             raise InvalidInputError(

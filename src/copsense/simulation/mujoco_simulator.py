@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
 
-from copsense.arrays import is_finite
+from copsense.arrays import check_type, is_finite
 from copsense.closing import close
 from copsense.errors import (
     EngineMismatchError,
@@ -29,7 +29,7 @@ from copsense.simulation.mujoco_drives import DriveForces
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.simulator import SimulatorStoppedError, Snapshot
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _AGREEMENT = 1e-8  # of mass matrix, bias and CoM, relative to their size
 
@@ -65,6 +65,10 @@ class MujocoSimulator:
         wrenches: str = "contacts",
     ) -> None:
         """Build the model and compare the engines."""
+        check_stance(stance)
+        if settings is not None:
+            remedy = "Give PhysicsSettings(time_step=1e-3), say, or leave it out."
+            check_type(settings, PhysicsSettings, "a value of PhysicsSettings", remedy)
         if wrenches not in ("contacts", "sensors"):
             raise UnknownNameError("source of wrenches", wrenches, ("contacts", "sensors"))
         self._stance, self._nq = stance, stance.robot.model.nq

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from copsense.arrays import finite_number, whole_number
+from copsense.arrays import (
+    check_name,
+    check_type,
+    checked_tuple,
+    finite_number,
+    whole_number,
+)
 from copsense.content import ShortRepr
 from copsense.controllers.target import Hold, PathReference, Signal
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -57,10 +63,16 @@ class Scenario(ShortRepr):
             raise InvalidInputError(
                 f"a scenario of {self.duration:g} s is too long. Give at most {LONGEST:g} s."
             )
-        pushes = (self.pushes,) if isinstance(self.pushes, Push) else tuple(self.pushes)
+        kinds = {"motors": Motors, "noise": Noise, "model_error": ModelError}
+        for name, kind in kinds.items():
+            remedy = f"Give copsense.simulation.{kind.__name__}(...)."
+            check_type(getattr(self, name), kind, f"a scenario's {name}", remedy)
+        check_name(self.name, "the name of a scenario")
+        remedy = "Give Push((0, 40, 0), start=0.5), or several."
+        pushes = checked_tuple(self.pushes, Push, "push", remedy)
         object.__setattr__(self, "pushes", pushes)
-        changes = self.friction
-        changes = (changes,) if isinstance(changes, FrictionChange) else tuple(changes)
+        remedy = "Give FrictionChange(0.2, start=1.0), or several."
+        changes = checked_tuple(self.friction, FrictionChange, "friction change", remedy)
         object.__setattr__(self, "friction", tuple(sorted(changes, key=lambda c: c.start)))
         for what, events in (("push", self.pushes), ("change of friction", self.friction)):
             for event in events:
