@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.commands import copsense
+from support.driven_files import sprung_rods
 
+from copsense import load_stance, minimum_torque, solve_equilibrium
 from copsense.simulation import Recording
 
 
@@ -245,3 +247,52 @@ def test_a_slower_controller_is_called_less_often(tmp_path):
         )
         assert answer.code == 0, answer.err
         assert Recording.load(data).attrs["control_period"] == period
+
+
+@pytest.fixture
+def rod_ankles(tmp_path):
+    """A file of a biped whose ankles are driven by cranks and rods; what stands it."""
+    path = tmp_path / "rods.xml"
+    path.write_text(sprung_rods())
+    return (path, "--contact", "l_foot", "--contact", "r_foot", "--contact-at", "sole")
+
+
+def test_drives_and_loads_are_those_of_the_analysis(rod_ankles, tmp_path):
+    changed = (
+        "--load", "trunk=0:2:-10", "--payload", "trunk=0.5", "--motor", "elbow",
+        "--passive", "shoulder", "--spring", "shoulder=6:10deg", "--couple", "r_yaw=-1*l_yaw",
+    )  # fmt: skip
+    data, file = tmp_path / "run.nc", tmp_path / "stance.toml"
+    run = ("--duration", 0.03, "--criterion", "minimum-torque", "--json")
+    answer = copsense(
+        "balance", *rod_ankles, *changed, *run, "--output", data, "--save-stance", file
+    )
+    assert answer.code == 0, answer.err
+    stance = load_stance(file)
+    assert [load.frame for load in stance.loads] == ["trunk"]
+    assert stance.robot.payloads[0].mass == 0.5
+    motors = stance.robot.torque_names
+    assert "elbow" in motors
+    assert not {"shoulder", "r_yaw", "l_ankle_pitch"} & set(motors)
+    recording = Recording.load(data)
+    assert tuple(recording.labels("motor")) == motors
+    # The first command is given at rest, on the reference posture.
+    static = solve_equilibrium(stance, minimum_torque())
+    first = recording.isel(time=0)
+    weight = stance.robot.weight
+    assert np.abs(first["torque_command"].values - static.torques).max() < 1e-9 * weight
+    assert np.abs(first["wrench_command"].values - static.wrenches).max() < 1e-9 * weight
+    middle = int(np.argmin(np.abs(recording["static_travel"].values)))
+    assert np.abs(recording["static_cop"].values[middle] - first["cop_command"].values).max() < 1e-6
+    again = copsense("balance", "--stance", file, *run)
+    assert again.json["torque_norm_mean"] == pytest.approx(
+        answer.json["torque_norm_mean"], rel=1e-9
+    )
+
+
+def test_a_joint_without_a_motor_that_nothing_holds_is_named_before_the_run(rod_ankles):
+    robot, *_ = rod_ankles
+    one = ("--contact", "l_foot", "--contact-at", "sole", "--posture", "l_knee=40deg")
+    said = copsense("balance", robot, *one, "--passive", "l_knee").error
+    assert "lacks" in said
+    assert "for want of a motor" in said

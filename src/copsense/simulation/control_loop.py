@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from copsense.arrays import finite_number, is_finite
+from copsense.arrays import check_type, finite_number, is_finite
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.criterion import Criterion
@@ -74,6 +74,11 @@ def rollout(
     """
     require("xarray", "a recording")
     finite_number(record_period, "the time between two rows [s]", positive=True)
+    remedy = "Give MujocoSimulator(stance), or what has its stance, time_step, reset and step."
+    check_type(simulator, Simulator, "a simulator", remedy)
+    check_type(scenario, Scenario, "a scenario", "Give Scenario(duration, reference).")
+    if thresholds is not None:
+        check_type(thresholds, Thresholds, "a value of Thresholds", "Give Thresholds(tilt=...).")
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
     # The matrices of a step are small: with more BLAS threads it is many times slower.
@@ -237,6 +242,12 @@ def _check_same(here: Stance, there: Stance, what: str) -> None:
         raise InvalidInputError(
             f"{what} is made for {there.robot.name!r} with {len(theirs)} joints, the simulator is "
             f"of {here.robot.name!r} with {len(ours)}. Use the same stance for both."
+        )
+    if here.robot.torque_names != there.robot.torque_names:
+        raise InvalidInputError(
+            f"{what} is made for a robot whose motors are {', '.join(there.robot.torque_names)}, "
+            f"the simulator's are {', '.join(here.robot.torque_names)}. Use the same drives for "
+            "both."
         )
     place, other = (np.array([p.homogeneous for p in s.placements]) for s in (here, there))
     if here.contact_names != there.contact_names or np.abs(place - other).max() > _PLACE:

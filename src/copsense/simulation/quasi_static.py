@@ -1,9 +1,10 @@
 """QuasiStatic: how far a motion is from one that is slow enough for statics.
 
-On flat ground the net centre of pressure of a motion is not under the CoM, but off by
-(h c'' - L' / m) / g: h the height of the CoM and L the angular momentum about it. Along a path with
-tangent t both are rates of the path's coordinate s, so that the CoP goes farther than the CoM by
-``lever s'' / g`` with the lever ``h - L_x / m`` (L_x per unit of the CoM's velocity along y).
+On flat ground the net centre of pressure of a motion is not where it is at rest, but off by
+m (h c'' - L' / m) / F_n: h the height of the CoM, L the angular momentum about it, and F_n the load
+of the ground, m g without other loads. Along a path with tangent t both are rates of the path's
+coordinate s, so that the CoP goes farther than at rest by ``lever s'' m / F_n`` with the lever
+``h - L_x / m`` (L_x per unit of the CoM's velocity along y).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class QuasiStatic:
 
     Attributes:
         lever: h - L_x / m where the path begins [m].
-        excess: peak distance of the net centre of pressure from the CoM's projection [m].
+        excess: peak distance of the net centre of pressure from where it is at rest [m].
         share: that in shares of the CoM's largest excursion; of a sine w^2 lever / g.
         frequency: up to which a sine's share is at most 0.05 [Hz].
     """
@@ -50,6 +51,8 @@ def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Sign
         signal: the coordinate, relative to the start, as a function of time.
     """
     g = stance.robot.weight / stance.robot.mass
+    if stance.applied is not None:  # what of the weight the loads leave to the ground
+        g -= float(stance.applied.wrenches[:, 2].sum()) / stance.robot.mass
     along, across, speed = net_lever(stance, tangent)
     lever = math.hypot(along, across)
     excess = lever * speed * peak_acceleration(signal) / g
