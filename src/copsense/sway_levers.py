@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from copsense.arrays import finite_array
 from copsense.cop import contact_cops
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.rigid_body import momentum_map
 from copsense.sensitivity import cop_rates
 from copsense.stance import Stance, check_at_rest
@@ -38,7 +38,8 @@ class SwayLever:
 
     Attributes:
         output: ``"net CoP"``, ``"load of l_sole"`` or ``"CoP of l_sole"``.
-        lever: h_X [m]; NaN where the output stands still along the path, at rest.
+        lever: h_X [m]; NaN where the output stands still along the path, at rest, and where a joint
+            hangs that a sway would leave behind.
         frequency: up to which the statics of this output are within 5 % in a sway [Hz]; NaN
             likewise, infinite where a sway changes nothing.
     """
@@ -82,7 +83,13 @@ def sway_levers(
     inertia = stance.mass_matrix @ t
     columns = np.column_stack([t, np.zeros_like(t)])
     loads = np.column_stack([np.zeros_like(t), inertia])
-    change = stance.unstack(equilibrium.derivative(columns, loads)[0])  # (nc, 6, 2)
+    try:
+        rates = equilibrium.derivative(columns, loads)[0]
+    except UndeterminedWrenchError:
+        # A joint without a motor that hangs is left behind: nothing gives it the path's motion.
+        at_rest = equilibrium.derivative(t[:, None])[0]
+        rates = np.hstack([at_rest, np.full_like(at_rest, np.nan)])
+    change = stance.unstack(rates)  # (nc, 6, 2)
     cops = cop_rates(equilibrium, contact_cops(equilibrium), change)
     along, _, speed = net_lever(stance, t)
     way = np.append(stance.com_jacobian[:2] @ t / speed, 0.0) if speed else np.zeros(3)

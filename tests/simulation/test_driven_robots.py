@@ -26,6 +26,7 @@ from copsense.simulation import (
 )
 from copsense.simulation.mujoco_model import build_model
 from copsense.simulation.quasi_static import quasi_static
+from copsense.sway_levers import sway_levers
 
 C1, C2 = copsense.minimum_wrench(0.5), copsense.minimum_torque()
 # Of the weight, in N and Nm: what a contact's normal force may be off after 0.12 s, while the soles
@@ -184,3 +185,15 @@ def test_a_controller_of_other_motors_is_rejected():
     controller = BalancingController(Stance(other, stance.q, stance.contacts), C2)
     with pytest.raises(InvalidInputError, match="Use the same drives"):
         rollout(MujocoSimulator(stance), controller, Scenario(0.01))
+
+
+def test_what_hangs_is_left_behind_by_a_sway_and_its_levers_are_not_known():
+    stance = CASES["all at once"]()
+    start, tangent = lateral_posture(stance, float(stance.com[1]))
+    net, *each = sway_levers(copsense.solve_equilibrium(start, C2), tangent)
+    assert 0.1 < net.lever < 1.0
+    assert all(np.isnan(lever.lever) for lever in each)
+    held = rods("pin")
+    start, tangent = lateral_posture(held, float(held.com[1]))
+    levers = sway_levers(copsense.solve_equilibrium(start, C2), tangent)
+    assert np.isfinite([lever.lever for lever in levers]).all()
