@@ -6,6 +6,8 @@ from support import log_files
 
 from copsense.logs import LogMap, compare_log, read_log
 from copsense.logs.log_statics import wrench_cops
+from copsense.logs.opening import open_log_file
+from copsense.logs.recognition import recognise
 
 FORMATS = {
     "log.csv": log_files.write_csv,
@@ -69,6 +71,20 @@ def test_the_base_comes_back(read_back, data, name):
     np.testing.assert_allclose(same, 1.0, atol=1e-9)
 
 
+def test_force_plates_come_back(icub, data, tmp_path):
+    file = tmp_path / "plates.c3d"
+    log_files.write_c3d(file, data)
+    plates = open_log_file(file)
+    (block,) = plates.blocks(["time", *plates.channels], lambda _: None)
+    np.testing.assert_allclose(block["time"][:, 0], data.t[0] + 0.004 * np.arange(601), atol=1e-6)
+    for k, (name, (x, y)) in enumerate(log_files.PLATES.items()):
+        w = data.w[:, data.contacts.index(name)]
+        moment = w[:, 3:] + np.cross((x, y, 0.0), w[:, :3])
+        found = block[f"plate {k + 1}"]
+        # The format holds numbers of 32 bits.
+        np.testing.assert_allclose(found, np.hstack([w[:, :3], moment]), rtol=0, atol=2e-4)
+
+
 def test_one_mcap_file_is_a_bag(read_back, data):
     read_back("ros2_mcap")
     (file,) = (read_back.folder / "ros2_mcap").glob("*.mcap")
@@ -79,9 +95,6 @@ def test_one_mcap_file_is_a_bag(read_back, data):
 
 
 def test_a_mapping_is_written_once_and_used_again(read_back, icub, data):
-    from copsense.logs.opening import open_log_file
-    from copsense.logs.recognition import recognise
-
     read_back("v73.mat")
     path = read_back.folder / "v73.mat"
     recognised = recognise(open_log_file(path), icub.robot, data.contacts)

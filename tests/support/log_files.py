@@ -23,6 +23,12 @@ def of_recording(recording):
     )
 
 
+def first(data, rows):
+    """The first rows alone."""
+    kept = {k: v[:rows] for k, v in vars(data).items() if k not in ("joints", "contacts")}
+    return SimpleNamespace(joints=data.joints, contacts=data.contacts, **kept)
+
+
 def table(data):
     """Headings and columns as a person would name them."""
     columns = {"time": data.t}
@@ -222,3 +228,50 @@ def write_eurobench(folder, data):
     names = [f"{kind}_{axis}" for kind in ("force", "torque") for axis in "xyz"]
     for name, c in (("ftl", 0), ("ftr", 1)):
         write(name, {n: data.w[:, c, i] for i, n in enumerate(names)})
+
+
+# Where the plates lie in the laboratory: left and right of its origin [m].
+PLATES = {"l_sole": (0.0, 0.3), "r_sole": (0.0, -0.3)}
+
+
+def write_c3d(path, data):
+    """Two force plates of type 2 in millimetres, their z axes down as plates have them.
+
+    The numbers are reactions, what the plate does to the foot: Fz of one who stands is negative.
+    """
+    import ezc3d
+
+    file = ezc3d.c3d()
+    rate, N = 1 / (data.t[1] - data.t[0]), len(data.t)
+    file["parameters"]["POINT"]["RATE"]["value"] = [rate]
+    file["parameters"]["POINT"]["LABELS"]["value"] = ["marker"]
+    file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
+    file["parameters"]["ANALOG"]["RATE"]["value"] = [rate]
+    file["data"]["points"] = np.zeros((4, 1, N))
+    flip = np.array([1.0, -1.0, -1.0])  # the plate's axes: x ahead, y right, z down
+    channels, corners = [], []
+    for name, (x, y) in PLATES.items():
+        # The foot stands in the middle of its plate, with the laboratory's axes.
+        force, moment = data.w[:, data.contacts.index(name)].reshape(N, 2, 3).swapaxes(0, 1)
+        channels += [*(force * flip).T, *(moment * flip * 1e3).T]
+        half = 0.25
+        square = [(half, -half), (-half, -half), (-half, half), (half, half)]
+        corners.append([[(x + a) * 1e3, (y + b) * 1e3, 0.0] for a, b in square])
+    labels = [f"{n}{k + 1}" for k in range(2) for n in ("Fx", "Fy", "Fz", "Mx", "My", "Mz")]
+    file["parameters"]["ANALOG"]["LABELS"]["value"] = labels
+    file["parameters"]["ANALOG"]["UNITS"]["value"] = (["N"] * 3 + ["Nmm"] * 3) * 2
+    file["data"]["analogs"] = np.array(channels)[None]
+    values = {
+        "USED": np.array([2]),
+        "TYPE": np.array([2, 2]),
+        "ZERO": np.array([1, 0]),
+        "CORNERS": np.array(corners).transpose(2, 1, 0),
+        "ORIGIN": np.zeros((3, 2)),
+        "CHANNEL": np.arange(1, 13).reshape(2, 6).T,
+    }
+    for name, value in values.items():
+        file.add_parameter("FORCE_PLATFORM", name, value.ravel().astype(float).tolist())
+        own = file["parameters"]["FORCE_PLATFORM"][name]
+        own["value"] = value
+        own["type"] = 2 if value.dtype.kind == "i" else 4  # integers, or floats
+    file.write(str(path))

@@ -62,7 +62,7 @@ def small_log(icub) -> Log:
     for joint in ("r_hip_roll", "l_ankle_roll"):
         positions[:, names.index(joint)] -= sway
     forces = np.zeros((2, 40, 6))
-    forces[:, :, 2] = icub.robot.weight * (0.5 + np.outer((1, -1), sway))
+    forces[:, :, 2] = icub.robot.weight * (0.5 + np.outer((-1, 1), sway))
     sensors = tuple(
         WrenchSeries(name, name, "", "sole", f)
         for name, f in zip(icub.contact_names, forces, strict=True)

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from copsense.errors import LogReadError
 from copsense.extras import require
-from copsense.logs.channel import Channel, LogFile, Meaning, Progress
+from copsense.logs.channel import Channel, LogFile, Meaning, Progress, reading
 
 _LOOKED_AT = 50  # messages of a topic from which its joints are known
 _ROWS = 4096
@@ -98,7 +98,7 @@ class BagFile(LogFile):
 
     def _first(self, reader: Any, topic: Any, count: int) -> list[Any]:
         found = []
-        with self._clear_errors():
+        with reading(self.path, "bag"):
             for connection, _, raw in reader.messages([topic]):
                 found.append(reader.deserialize(raw, connection.msgtype))
                 if len(found) == count:
@@ -116,7 +116,7 @@ class BagFile(LogFile):
             wanted = [c for c in reader.connections if c.topic in topics]
             total = sum(c.msgcount for c in wanted)
             share, done = self._size() / max(1, total), 0
-            with self._clear_errors():
+            with reading(self.path, "bag"):
                 for connection, stamp, raw in reader.messages(wanted):
                     message = reader.deserialize(raw, connection.msgtype)
                     for clock, row in self._rows(connection, stamp, message):
@@ -186,26 +186,13 @@ class BagFile(LogFile):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
-        with self._clear_errors():
+        with reading(self.path, "bag"):
             reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             reader.open()
         try:
             yield reader
         finally:
             reader.close()
-
-    @contextmanager
-    def _clear_errors(self) -> Iterator[None]:
-        """Whatever the reader stumbles over in a damaged bag, as one error."""
-        try:
-            yield
-        except (LogReadError, GeneratorExit):
-            raise
-        except Exception as error:
-            raise LogReadError(
-                f"{self.path} is not a whole bag: {type(error).__name__}: {error}. It may have "
-                "been cut short: copy it again, or let rosbag reindex or mcap recover repair it."
-            ) from None
 
 
 def _stamp(message: Any, received: int) -> float:

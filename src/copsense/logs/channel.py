@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -11,7 +12,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from jaxtyping import Float
 
-from copsense.errors import UnknownNameError
+from copsense.errors import CopsenseError, LogReadError, UnknownNameError
 
 Meaning = Literal[
     "", "time", "positions", "velocities", "torques", "wrench", "base position", "base rotation"
@@ -99,6 +100,29 @@ class LogFile(ABC):
     def add(self, channel: Channel) -> None:
         """Add a channel."""
         self.channels[channel.key] = channel
+
+
+@contextmanager
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Whatever a library stumbles over in a damaged file, as one error.
+
+    Args:
+        path: of the file.
+        what: it should be, such as ``"Parquet file"``.
+
+    Raises:
+        LogReadError: anything but an error of copsense's was raised inside.
+    """
+    try:
+        yield
+    except CopsenseError:
+        raise
+    except Exception as error:
+        said = str(error).strip().splitlines() or [type(error).__name__]
+        raise LogReadError(
+            f"{path} is not a whole {what}: {said[0].rstrip('.')}. It may have been cut short; "
+            "copy it again."
+        ) from None
 
 
 def no_progress(_: int) -> None:

@@ -24,6 +24,7 @@ from copsense.logs.log_audit import (
     audit_feet,
     audit_forces,
     audit_middle,
+    audit_slope,
     check_encoders,
     check_joints,
 )
@@ -116,7 +117,7 @@ def compare_log(
     travel, distance = _travel(placed, com)
     measured, times = wrenches[rows], log.times[rows]
     sway, slopes = _slopes(times, travel, distance, measured, statics, feet, skip, notes)
-    findings += _middle(feet, slopes)
+    findings += _audit_slopes(feet, slopes)
     findings += audit_com(com[:, :2], _total_cop(placed, measured))
     notes.append(
         f"joints smoothed by a Savitzky-Golay filter of {window:.3g} s (cubic); accelerations are "
@@ -343,14 +344,19 @@ def _slopes(
     return sway, slopes
 
 
-def _middle(
+def _audit_slopes(
     contacts: Sequence[Contact], slopes: dict[str, dict[str, SlopeEstimate]]
 ) -> list[Finding]:
     load = slopes.get("load", {})
     if MEASURED not in load:
         return []
-    others = {name: s.middle for name, s in load.items() if name != MEASURED}
-    return audit_middle([c.name for c in contacts], load[MEASURED].middle, others)
+    names, measured = [c.name for c in contacts], load[MEASURED]
+    others = {name: s for name, s in load.items() if name != MEASURED}
+    middles = {name: s.middle for name, s in others.items()}
+    return [
+        *audit_middle(names, measured.middle, middles),
+        *audit_slope(names, measured, list(others.values())),
+    ]
 
 
 def _torques(

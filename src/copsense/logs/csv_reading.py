@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from copsense.errors import LogReadError
 from copsense.extras import require
-from copsense.logs.channel import ROWS, Channel, LogFile, Progress
+from copsense.logs.channel import ROWS, Channel, LogFile, Progress, reading
 
 _SNIFFED = 65536  # bytes in which the heading must end
 
@@ -66,7 +66,7 @@ class CsvFile(LogFile):
         text = dict.fromkeys(wanted, 0)
         with self.path.open("rb") as file:
             at = 0
-            try:
+            with reading(self.path, "table"):
                 for part in pd.read_csv(
                     file,
                     sep=self._separator,
@@ -91,11 +91,6 @@ class CsvFile(LogFile):
                     yield block
                     advance(file.tell() - at)
                     at = file.tell()
-            except (ValueError, OSError, OverflowError) as error:
-                raise LogReadError(
-                    f"{self.path} cannot be read as a table: {str(error).strip().rstrip('.')}. "
-                    "Every row needs the columns of the heading."
-                ) from None
         for key, count in text.items():
             if count:
                 self.notes.append(

@@ -104,7 +104,8 @@ def _below_taken_off(
     found = np.full((len(values), 6), np.nan)
     for i in np.flatnonzero(np.isfinite(values).all(axis=1)):
         q, v, a = motion.configurations[i], motion.velocities[i], motion.accelerations[i]
-        pin.rnea(model, data, q, v, a)  # leaves in a_gf the accelerations less gravity
+        pin.forwardKinematics(model, data, q)  # where the links are
+        pin.rnea(model, data, q, v, a)  # leaves in a_gf their accelerations less gravity
         sensor = data.oMi[own.parentJoint] * own.placement
         total = sensor.act(pin.Force(values[i]))
         for body, inertia in inertias:

@@ -13,6 +13,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.logs.finding import Finding, dated
 from copsense.logs.log import Log
 from copsense.logs.log_motion import LogMotion
+from copsense.logs.sway_fit import SlopeEstimate
 from copsense.robot import Robot
 
 _TOTAL = 0.02  # of the weight by which the normal forces may miss it
@@ -225,6 +226,23 @@ def audit_middle(
             f"with the CoM in the middle {names[0]} carries {measured:.3f} of the load, and every "
             f"criterion says {values.min():.3f} to {values.max():.3f}: offsets of the sensors, or "
             "preload between the feet. Slopes do not depend on it.",
+        )
+    ]
+
+
+def audit_slope(
+    names: Sequence[str], measured: SlopeEstimate, predicted: Sequence[SlopeEstimate]
+) -> list[Finding]:
+    """A load that moves against the centre of mass, where every criterion has it move along."""
+    if measured.high >= 0 or not predicted or min(p.value for p in predicted) < 0:
+        return []
+    return [
+        Finding(
+            "sign",
+            names[0],
+            f"the load of {names[0]} falls as the CoM comes nearer ({measured.value:.3f}): the "
+            f"sensors of {names[0]} and {names[-1]} may be exchanged, or a hip's or ankle's sign "
+            "be wrong.",
         )
     ]
 

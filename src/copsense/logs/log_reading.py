@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from copsense.logs.collecting import TooLargeError, collect
 from copsense.logs.finding import Finding, dated, stretches
 from copsense.logs.log import Log, WrenchSeries
 from copsense.logs.log_map import COMPONENTS, TIME_UNITS, BaseMap, LogMap
-from copsense.logs.one_clock import Clock, equal_steps, gaps, on_clock, ordered
+from copsense.logs.one_clock import Clock, equal_steps, gaps, in_gap, on_clock, ordered
 from copsense.logs.opening import open_log_file
 from copsense.logs.recognition import recognise
 from copsense.logs.rotations import rotation_quaternions
@@ -113,6 +114,10 @@ class _Reading:
         used |= {c.key for c in self.base}
         clocks = {key: self._clock_of(key) for key in used}
         clocks |= {clock: clock for clock in set(clocks.values()) if clock}
+        for key, clock in clocks.items():  # as mapped, for a reader to keep rows together
+            own = self.file.channels[key]
+            meaning = "time" if key == clock else own.meaning
+            self.file.channels[key] = replace(own, clock=clock, meaning=meaning)
         self.data = self._collected(clocks)
         self.clocks = {clock: self._clock(clock) for clock in set(clocks.values())}
         self.clock_of = clocks
@@ -132,6 +137,7 @@ class _Reading:
         base = self._base_rows(times) if self.base else None
         start = float(times[0])
         times = times - start
+        self.in_gap = in_gap(main, times + start)
         self._missing("the joints", positions, times)
         log = Log(
             self.file.path.name,
@@ -272,8 +278,7 @@ class _Reading:
         return np.hstack([read[:, :3], turned])
 
     def _missing(self, what: str, values: np.ndarray, times: np.ndarray) -> None:
-        lost = ~np.isfinite(values).all(axis=1)
-        said = any(f.kind == "gap" and f.about == what for f in self.findings)
+        lost = ~np.isfinite(values).all(axis=1) & ~self.in_gap
         found = dated(
             "missing",
             what,
@@ -281,7 +286,7 @@ class _Reading:
             lost,
             times,
         )
-        if found is not None and not (said and lost.sum() < 0.05 * len(times)):
+        if found is not None:
             self.findings.append(found)
 
     def _checked(self, series: WrenchSeries, times: np.ndarray) -> WrenchSeries:

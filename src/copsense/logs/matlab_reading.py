@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.errors import LogReadError
-from copsense.logs.channel import ROWS, Channel, LogFile, Meaning, Progress
+from copsense.logs.channel import ROWS, Channel, LogFile, Meaning, Progress, reading
 from copsense.logs.matlab_tree import Leaf, read_tree
 
 _CLOCKS = re.compile(r"^(timestamps?|times?|t|tout|time_?s|stamps?|.*[jJ]ointsTime)$")
@@ -40,6 +40,8 @@ class MatlabFile(LogFile):
         """Read what it holds; of v7.3 without the numbers."""
         super().__init__(path)
         leaves, notes, close = read_tree(path)
+        # A v5 file is in memory now; of v7.3 only what is asked for will be.
+        self._whole = leaves if close is None else None
         self.notes += notes
         self.texts: dict[str, tuple[str, ...]] = {x.key: x.texts for x in leaves if x.texts}
         self._read: dict[str, tuple[Leaf, int]] = {}
@@ -54,7 +56,8 @@ class MatlabFile(LogFile):
                 self.layout = "Simulink structure"
                 self._add_simulink(group, own["values"], numbers)
         self._add_flat([leaf for leaf in numbers if leaf.key not in self._read])
-        close()
+        if close is not None:
+            close()
         if not self._read:
             raise LogReadError(
                 f"{path} holds no signal over time. {' '.join(self.notes[:3])}".strip()
@@ -138,7 +141,9 @@ class MatlabFile(LogFile):
         self, keys: Sequence[str], advance: Progress
     ) -> Iterator[Mapping[str, Float[np.ndarray, "n k"]]]:
         """Rows of some arrays, those of one clock together."""
-        leaves, _, close = read_tree(self.path)
+        leaves, close = self._whole, None
+        if leaves is None:
+            leaves, _, close = read_tree(self.path)
         found = {leaf.key: leaf for leaf in leaves}
         clocks: dict[str, list[str]] = {}
         for key in dict.fromkeys(keys):
@@ -148,25 +153,31 @@ class MatlabFile(LogFile):
         try:
             for own_keys in clocks.values():
                 parts = {key: (found[key], self._read[key][1]) for key in own_keys}
-                rows = {leaf.shape[axis] for leaf, axis in parts.values()}
-                if len(rows) != 1:
-                    raise LogReadError(
-                        f"{', '.join(own_keys)} of {self.path.name} have {sorted(rows)} rows. Map "
-                        "signals of one clock, or give each its own."
-                    )
-                (total,) = rows
-                for begin in range(0, total, ROWS):
-                    end = min(begin + ROWS, total)
-                    block = {}
-                    for key, (leaf, axis) in parts.items():
-                        assert leaf.read is not None
-                        block[key] = leaf.read(axis, begin, end).reshape(end - begin, -1)
+                for block, share in self._group(parts):
                     yield block
-                    advance(round(size * (end - begin) / total))
-        except (OSError, RuntimeError) as error:
-            raise LogReadError(f"{self.path} is damaged: {error}. Copy it again.") from None
+                    advance(round(size * share))
         finally:
-            close()
+            if close is not None:
+                close()
+
+    def _group(
+        self, parts: Mapping[str, tuple[Leaf, int]]
+    ) -> Iterator[tuple[dict[str, Float[np.ndarray, "n k"]], float]]:
+        """Rows of arrays that have one clock, and which share of all rows they are."""
+        rows = {leaf.shape[axis] for leaf, axis in parts.values()}
+        if len(rows) != 1:
+            raise LogReadError(
+                f"{', '.join(parts)} of {self.path.name} have {sorted(rows)} rows. Map signals of "
+                "one clock, or give each its own."
+            )
+        (total,) = rows
+        for begin in range(0, total, ROWS):
+            end, block = min(begin + ROWS, total), {}
+            with reading(self.path, "MATLAB file"):
+                for key, (leaf, axis) in parts.items():
+                    assert leaf.read is not None
+                    block[key] = leaf.read(axis, begin, end).reshape(end - begin, -1)
+            yield block, (end - begin) / total
 
 
 def _is_vector(leaf: Leaf) -> bool:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from copsense.errors import LogReadError
 from copsense.extras import require
+from copsense.logs.apart import read_apart
+from copsense.logs.channel import reading
 
-_DEEPEST = 12  # structures within structures
+_DEEPEST = 12  # structures within structures, as in `matlab5`
 
 
 @dataclass(frozen=True)
@@ -43,99 +44,52 @@ class Leaf:
         return self.key.rpartition(".")[2]
 
 
-def read_tree(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object]]:
-    """The leaves of a MATLAB file, what cannot be read of it, and what closes the file.
+def read_tree(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object] | None]:
+    """The leaves of a MATLAB file, what cannot be read of it, and what closes it if it is open.
 
     Raises:
         LogReadError: it is not a MATLAB file, or is cut short.
     """
-    try:
-        with path.open("rb") as file:
-            head = file.read(1024)
-    except OSError as error:
-        raise LogReadError(f"{path} cannot be opened: {error}.") from None
+    with reading(path, "MATLAB file"), path.open("rb") as file:
+        head = file.read(1024)
     if b"\x89HDF\r\n\x1a\n" in (head[:8], head[512:520]):
         return _read_hdf5(path)
     return _read_v5(path)
 
 
-def _read_v5(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object]]:
-    from scipy.io import loadmat
-
-    try:
-        held = loadmat(path, struct_as_record=False, squeeze_me=False, chars_as_strings=True)
-    # SciPy raises whatever it stumbles over in a damaged file.
-    except Exception as error:
-        raise LogReadError(
-            f"{path} is not a whole MATLAB file: {type(error).__name__}: {error}. It may have been "
-            "cut short; copy it again."
-        ) from None
-    notes: list[str] = []
-    leaves: list[Leaf] = []
+def _read_v5(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object] | None]:
+    held = read_apart("matlab5", path, "MATLAB file")
+    notes = [_object(key, "an object") for key in map(str, held.pop("objects"))]
+    leaves = []
     for name, value in held.items():
-        if not name.startswith("__"):
-            leaves += _v5_leaves(name, value, notes, 0)
-    return leaves, notes, held.clear
-
-
-def _v5_leaves(key: str, value: Any, notes: list[str], depth: int) -> Iterator[Leaf]:
-    from scipy.io.matlab import MatlabFunction, MatlabOpaque
-
-    if depth > _DEEPEST:
-        return
-    if isinstance(value, MatlabOpaque | MatlabFunction):
-        notes.append(_object(key, "an object"))
-    elif hasattr(value, "_fieldnames"):
-        for field in value._fieldnames:
-            yield from _v5_leaves(f"{key}.{field}", getattr(value, field), notes, depth + 1)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "US":
-        yield Leaf(key, (), None, tuple(str(text).strip() for text in value.ravel()))
-    elif isinstance(value, np.ndarray) and value.dtype == object:
-        parts = list(value.ravel())
-        texts = [_one_text(part) for part in parts]
-        if parts and all(text is not None for text in texts):
-            yield Leaf(key, (), None, tuple(str(text) for text in texts))
-        else:
-            for i, part in enumerate(parts):
-                place = key if len(parts) == 1 else f"{key}({i + 1})"
-                yield from _v5_leaves(place, part, notes, depth + 1)
-    elif isinstance(value, np.ndarray) and value.dtype.kind in "biuf" and value.size:
+        key = name.removeprefix("=")
+        if value.dtype.kind == "U":
+            leaves.append(Leaf(key, (), None, tuple(map(str, value))))
+            continue
 
         def read(axis: int, begin: int, end: int, array: np.ndarray = value) -> np.ndarray:
             return np.asarray(np.moveaxis(array, axis, 0)[begin:end], float)
 
-        yield Leaf(key, value.shape, read)
+        leaves.append(Leaf(key, value.shape, read))
+    return leaves, notes, None
 
 
-def _one_text(part: Any) -> str | None:
-    if isinstance(part, str):
-        return part
-    if isinstance(part, np.ndarray) and part.dtype.kind in "US" and part.size == 1:
-        return str(part.ravel()[0]).strip()
-    return None
-
-
-def _read_hdf5(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object]]:
+def _read_hdf5(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object] | None]:
     require("h5py", "reading a MATLAB v7.3 file")
     import h5py
 
     notes: list[str] = []
     leaves: list[Leaf] = []
-    try:
+    with reading(path, "MATLAB v7.3 file"):
         file = h5py.File(path, "r")
-    except (OSError, RuntimeError) as error:
-        raise LogReadError(
-            f"{path} is not a whole MATLAB v7.3 file: {error}. It may have been cut short; copy it "
-            "again."
-        ) from None
-    try:
-        strings = iter(_object_strings(file))
-        for name in sorted(file, key=lambda n: _order(file, n)):
-            if not name.startswith("#"):
-                leaves += _hdf5_leaves(file, name, file[name], notes, strings, 0)
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        file.close()
-        raise LogReadError(f"{path} is damaged: {error}. Copy it again.") from None
+        try:
+            strings = iter(_object_strings(file))
+            for name in sorted(file, key=lambda n: _order(file, n)):
+                if not name.startswith("#"):
+                    leaves += _hdf5_leaves(file, name, file[name], notes, strings, 0)
+        except BaseException:
+            file.close()
+            raise
     return leaves, notes, file.close
 
 

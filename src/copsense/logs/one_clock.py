@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from copsense.errors import InvalidInputError
 from copsense.logs.finding import Finding
@@ -13,6 +13,7 @@ from copsense.logs.finding import Finding
 _EVEN = 1e-3  # of a step: times that differ less from equal steps are equal steps
 _GAP = 0.1  # s without a sample that are a gap, or
 _STEPS = 5.0  # as many steps, whichever is longer
+_AHEAD = 20.0  # times the length that a log's rows make up, from which a jump is no gap
 _BURST = 0.3  # steps that much shorter than usual are samples that were delivered late, together
 _CLOSE = 0.9  # steps that late samples are spread by, of the usual one
 _BACKWARDS = 0.5  # share of the rows that a clock may lose
@@ -92,6 +93,7 @@ def ordered(key: str, times: Float[np.ndarray, " N"], what: str) -> Clock:
         raise InvalidInputError(
             f"the clock of {what} ({key}) has fewer than two times in order. Map another clock."
         )
+    _check_jump(key, what, times[rows])
     own, late = _spread(times[rows])
     if late is not None:
         findings.append(
@@ -106,6 +108,21 @@ def ordered(key: str, times: Float[np.ndarray, " N"], what: str) -> Clock:
             )
         )
     return Clock(key, own, rows, tuple(findings))
+
+
+def _check_jump(key: str, what: str, times: Float[np.ndarray, " n"]) -> None:
+    """Reject a clock that is set ahead by more than the log is long.
+
+    Raises:
+        InvalidInputError: it is.
+    """
+    steps = np.diff(times)
+    if times[-1] - times[0] > _AHEAD * len(times) * float(np.median(steps)) + 1.0:
+        at = int(np.argmax(steps))
+        raise InvalidInputError(
+            f"the clock of {what} ({key}) jumps ahead by {steps[at]:.4g} s after {at + 1} of "
+            f"{len(times)} rows. Map another clock, or cut the log where it was set."
+        )
 
 
 def _spread(
@@ -167,6 +184,15 @@ def gaps(clock: Clock, what: str) -> list[Finding]:
     ]
 
 
+def in_gap(clock: Clock, times: Float[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+    """Which times lie in a gap of a clock."""
+    right = np.clip(np.searchsorted(clock.times, times, side="right"), 1, len(clock.times) - 1)
+    left, near = right - 1, _EVEN * clock.step
+    wide = clock.times[right] - clock.times[left] > clock.gap
+    inside = (times > clock.times[left] + near) & (times < clock.times[right] - near)
+    return np.asarray(wide & inside)
+
+
 def on_clock(
     clock: Clock, values: Float[np.ndarray, "n k"], times: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, "N k"]:
@@ -193,6 +219,5 @@ def on_clock(
     )
     slack = 0.5 * clock.step
     outside = (times < own[0] - slack) | (times > own[-1] + slack)
-    hole = (width > clock.gap) & ((share > near) & (share < 1 - near))[:, 0]
-    found[outside | hole] = np.nan
+    found[outside | in_gap(clock, times)] = np.nan
     return np.asarray(found)

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from copsense.errors import LogReadError
 from copsense.extras import require
-from copsense.logs.channel import ROWS, Channel, LogFile, Progress
+from copsense.logs.channel import ROWS, Channel, LogFile, Progress, reading
 
 
 class ParquetFile(LogFile):
@@ -26,25 +26,20 @@ class ParquetFile(LogFile):
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        try:
-            with pq.ParquetFile(path) as file:
-                schema = file.schema_arrow
-                lists = [f.name for f in schema if _is_list(f.type)]
-                first = next(file.iter_batches(1, columns=lists), None) if lists else None
-                for each in schema:
-                    if _is_list(each.type):
-                        one = first.column(each.name)[0].as_py() if first is not None else None
-                        if one and all(isinstance(x, float | int) for x in one):
-                            self.add(Channel(each.name, len(one)))
-                    elif pa.types.is_temporal(each.type):
-                        unit = getattr(each.type, "unit", "ns")
-                        self.add(Channel(each.name, 1, unit_time=unit))
-                    elif pa.types.is_floating(each.type) or pa.types.is_integer(each.type):
-                        self.add(Channel(each.name, 1))
-        except (OSError, ValueError, IndexError, pa.ArrowException) as error:
-            raise LogReadError(
-                f"{path} is not a whole Parquet file: {str(error).splitlines()[0]}"
-            ) from None
+        with reading(path, "Parquet file"), pq.ParquetFile(path) as file:
+            schema = file.schema_arrow
+            lists = [f.name for f in schema if _is_list(f.type)]
+            first = next(file.iter_batches(1, columns=lists), None) if lists else None
+            for each in schema:
+                if _is_list(each.type):
+                    one = first.column(each.name)[0].as_py() if first is not None else None
+                    if one and all(isinstance(x, float | int) for x in one):
+                        self.add(Channel(each.name, len(one)))
+                elif pa.types.is_temporal(each.type):
+                    unit = getattr(each.type, "unit", "ns")
+                    self.add(Channel(each.name, 1, unit_time=unit))
+                elif pa.types.is_floating(each.type) or pa.types.is_integer(each.type):
+                    self.add(Channel(each.name, 1))
         if not self.channels:
             raise LogReadError(f"{path} has no column of numbers. Give a table of signals.")
 
@@ -52,21 +47,14 @@ class ParquetFile(LogFile):
         self, keys: Sequence[str], advance: Progress
     ) -> Iterator[Mapping[str, Float[np.ndarray, "n k"]]]:
         """Rows of some columns."""
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         wanted = list(dict.fromkeys(keys))
-        try:
-            with pq.ParquetFile(self.path, memory_map=False) as file:
-                share = self.path.stat().st_size / max(1, file.metadata.num_rows)
-                batches = file.iter_batches(max(1, ROWS * 8 // len(wanted)), columns=wanted)
-                for batch in batches:
-                    yield {key: self._numbers(key, batch.column(key)) for key in wanted}
-                    advance(round(share * batch.num_rows))
-        except (OSError, ValueError, pa.ArrowException) as error:
-            raise LogReadError(
-                f"{self.path} cannot be read to its end: {str(error).splitlines()[0]}"
-            ) from None
+        with reading(self.path, "Parquet file"), pq.ParquetFile(self.path) as file:
+            share = self.path.stat().st_size / max(1, file.metadata.num_rows)
+            for batch in file.iter_batches(max(1, ROWS * 8 // len(wanted)), columns=wanted):
+                yield {key: self._numbers(key, batch.column(key)) for key in wanted}
+                advance(round(share * batch.num_rows))
 
     def _numbers(self, key: str, column: Any) -> Float[np.ndarray, "n k"]:
         import pyarrow as pa
