@@ -446,9 +446,9 @@ def joint_groups(stance: Stance) -> dict[str, tuple[str, ...]]:
         for place, joint in enumerate(stance.limb(contact)):
             names = depth.setdefault(f"joint{place + 1}", [])
             name = stance.robot.model.names[joint]
-            if name not in names:
+            if name in motors and name not in names:
                 names.append(name)
-    return {place: tuple(names) for place, names in depth.items()}
+    return {place: tuple(names) for place, names in depth.items() if names}
 
 
 def pareto(candidates: Sequence[Score], cost: Callable[[Score], float]) -> tuple[Score, ...]:

@@ -17,12 +17,14 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import whole_number
 from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
     Unit,
     chart_coordinates,
     checked_values,
     joint_units,
     row_units,
+    solved_whole,
 )
 from copsense.batch.postures.posture_batch import PostureBatch, empty_postures
 from copsense.batch.postures.reference_search import search_one
@@ -53,6 +55,10 @@ class PostureChart:
     leave a choice, every step of the search is the smallest one. Each row starts from the stance's
     own configuration, so that it depends on its values alone.
 
+    Where loops, couplings or hanging joints tie base and limbs together, the whole robot is solved
+    for (`solve_posture`): base coordinates cannot be named, and what is not named stays as near to
+    the stance's own as it can.
+
     Contacts that a chart moves need nothing more from `evaluate_batch`: where they stand follows
     from the configuration, and they stay on the planes that the stance states.
 
@@ -81,12 +87,6 @@ class PostureChart:
             InvalidInputError: no name, one twice, or two that contradict each other.
             UnknownNameError: a name that is not a coordinate.
         """
-        if stance.closures is not None or stance.hanging:
-            raise InvalidInputError(
-                f"robot {stance.robot.name!r} has loops, couplings or joints that hang, which are "
-                "no coordinates of a chart. Sweep it along a path (copsense.lateral_sweep), or "
-                "solve each posture (copsense.solve_posture)."
-            )
         self.stance = stance
         self._coordinates = chart_coordinates(stance, coordinates)
         self.names, self.units = self._coordinates.names, self._coordinates.units
@@ -95,6 +95,7 @@ class PostureChart:
         self._joints, self._rows_named = joint_units(stance), row_units(stance, self._coordinates)
         self._code: Callable[..., None] | None = None
         self.fallback_reason = why_not_covered(stance)
+        self._whole = solved_whole(stance)
         if not self.fallback_reason and stance.false_motions.shape[1]:
             self.fallback_reason = "the contacts hold a motion to second order only"
         if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
@@ -135,8 +136,12 @@ class PostureChart:
         which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
         if not self.fallback_reason and len(x):
             self._run(x, batch, status, which, excess, threads)
+        said: dict[int, str] = {}
         for row in np.flatnonzero(status == ELSEWHERE):
-            found = search_one(self.stance, self._coordinates, x[row])
+            if self._whole:
+                found, said[int(row)] = closed_one(self.stance, self._coordinates, x[row])
+            else:
+                found = search_one(self.stance, self._coordinates, x[row])
             batch.configurations[row], batch.residuals[row] = found.q, found.residual
             batch.iterations[row], status[row] = found.iterations, found.status
             which[row], excess[row] = found.which, found.excess
@@ -144,7 +149,7 @@ class PostureChart:
         failed = np.flatnonzero(~batch.converged)
         batch.configurations[failed] = np.nan
         for row in failed:
-            batch.reasons[row] = self._why_not(
+            batch.reasons[row] = said.get(int(row)) or self._why_not(
                 int(status[row]), int(which[row]), excess[row], batch.residuals[row]
             )
         return batch

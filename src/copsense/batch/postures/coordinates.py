@@ -80,9 +80,15 @@ class Coordinates(ShortRepr):
     high: np.ndarray
 
 
+def solved_whole(stance: Stance) -> bool:
+    """Whether loops, couplings or hanging joints tie base and limbs of a robot together."""
+    return stance.closures is not None or bool(stance.hanging)
+
+
 def coordinate_names(stance: Stance) -> tuple[str, ...]:
     """Names that a chart of this stance takes."""
-    base = BASE if stance.robot.base_nv == 6 else ()
+    # With loops or hanging joints nothing but the whole robot can be solved for.
+    base = BASE if stance.robot.base_nv == 6 and not solved_whole(stance) else ()
     feet = [
         f"{c.name}:{way}"
         for c, normal in zip(stance.contacts, _normals(stance), strict=True)

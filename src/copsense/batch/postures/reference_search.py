@@ -80,7 +80,7 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
         which = int(sizes.argmax())
         hopeless = steps % PATIENCE == 0 and steps > 0 and worst > PROGRESS * before
         if worst < TOLERANCE and folded < TOLERANCE:
-            status, joint, excess = _within(here, plan)
+            status, joint, excess = within_limits(here, plan)
             return Attempt(here.q, worst, steps, status, joint, excess)
         if steps >= MOST_STEPS or hopeless:
             status = UNSOLVED if steps >= MOST_STEPS else STUCK
@@ -122,7 +122,7 @@ def _advance(
         given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
 
 
-def _within(here: Stance, plan: Coordinates) -> tuple[int, int, float]:
+def within_limits(here: Stance, plan: Coordinates) -> tuple[int, int, float]:
     """Solved or beyond a limit; the joint velocity that is worst beyond it, and by how much."""
     x = np.zeros(len(plan.low))
     for joint in list(here.robot.model.joints)[2:]:
@@ -159,6 +159,16 @@ def _moved(
     return np.asarray(q)
 
 
+def contact_target(plan: Coordinates, k: int, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where contact k is to be: its origin (3,) and axes (3, 3), for its x, y and yaw (3,)."""
+    first = len(plan.given) - 3 * len(plan.positions) + 3 * k
+    way = wanted - plan.given[first : first + 3]
+    s, c = np.sin(way[2]), np.cos(way[2])
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+    position = plan.positions[k] + [way[0], way[1], plan.slopes[k] @ way[:2]]
+    return position, plan.rotations[k] @ turn
+
+
 def _errors(here: Stance, plan: Coordinates, given: np.ndarray) -> tuple[np.ndarray, bool]:
     """h, limb by limb, world axes [m, rad]; a planar contact's in its own axes.
 
@@ -168,15 +178,11 @@ def _errors(here: Stance, plan: Coordinates, given: np.ndarray) -> tuple[np.ndar
     for limb in plan.limbs:
         for k in limb.contacts:
             contact, place = here.contacts[k], here.placements[k]
-            wanted = given[nv + 3 + 3 * k : nv + 6 + 3 * k]
-            way = wanted - plan.given[nv + 3 + 3 * k : nv + 6 + 3 * k]
-            target = plan.positions[k] + [way[0], way[1], plan.slopes[k] @ way[:2]]
+            target, R = contact_target(plan, k, given[nv + 3 + 3 * k : nv + 6 + 3 * k])
             off = place.translation - target
             if contact.kind == "point":
                 errors.append(off)
                 continue
-            s, c = np.sin(way[2]), np.cos(way[2])
-            R = plan.rotations[k] @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
             turn = np.cross(R.T, place.rotation.T).sum(axis=0)
             open_ = 1.0 + float(np.sum(R * place.rotation))
             turn = 2.0 / max(open_, OPPOSITE) * turn

@@ -81,9 +81,12 @@ class BatchKernel:
         self._single: _Single | None = None
         self._nq = int(stance.robot.model.nq)
         self._expected = arrays_of(self.empty(0))
-        served = kernel_criteria(stance, self.criteria)
-        self._serves_all = len(served.column) == len(self.criteria)
         self.fallback_reason = why_not_covered(stance)
+        for criterion in self.criteria:
+            if isinstance(criterion, Criterion):
+                criterion.at(stance)  # weights that do not fit are an error, not a failed row
+        served = kernel_criteria(stance, () if self.fallback_reason else self.criteria)
+        self._serves_all = len(served.column) == len(self.criteria)
         lines = [c.name for c in stance.contacts if c.sole is not None and len(c.sole) == 2]
         if not self.fallback_reason and lines:
             self.fallback_reason = f"the sole of {lines[0]} is a line"
