@@ -23,7 +23,7 @@ from copsense.arrays import (
     read_only,
 )
 from copsense.description import Description, load_description
-from copsense.drives import Actuation, Drives, Spring
+from copsense.drives import Actuation, Drives
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
@@ -493,13 +493,12 @@ class Robot:
 
     def joint_forces(self, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " nv"]:
         """Torques of the springs and of what is held on the joints (nv,) [Nm, or N]."""
-        found, drives = np.zeros(self.model.nv), self.drives
-        for joint in {**drives.springs, **drives.held}:
-            spring = drives.springs.get(joint, Spring(0.0))
+        found = np.zeros(self.model.nv)
+        for joint, torque in self.drives.held.items():
+            found[self.velocity_index(joint)] = torque
+        for joint, spring in self.drives.springs.items():
             stretch = self.joint_position(q, joint) - spring.rest
-            found[self.velocity_index(joint)] = (
-                drives.held.get(joint, 0.0) - spring.stiffness * stretch
-            )
+            found[self.velocity_index(joint)] -= spring.stiffness * stretch
         return found
 
     def frame(self, name: str) -> pin.Frame:

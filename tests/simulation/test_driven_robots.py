@@ -18,6 +18,7 @@ from copsense.simulation import (
     ModelError,
     MujocoSimulator,
     PhysicsSettings,
+    Push,
     Recording,
     Scenario,
     balance,
@@ -80,6 +81,16 @@ def test_a_sway_is_followed_and_its_torques_are_named_by_their_motors(tmp_path):
     again = Recording.load(tmp_path / "sway.nc")
     assert again.torque_norm == recording.torque_norm > 0
     assert render_figure(plot_rollout(again), ".png")
+
+
+def test_a_joint_that_hangs_is_brought_to_rest_by_the_motors_that_reach_it():
+    stance = CASES["all at once"]()
+    pushed = Scenario(0.5, pushes=(Push((1.0, 0.0, 0.0), 0.05, 0.05, "hand"),))
+    recording = rollout(MujocoSimulator(stance), BalancingController(stance, C2), pushed)
+    assert recording.completed
+    speed = np.abs(recording["joint_velocity"].sel(joint="forearm"))
+    soon, later = (float(speed.sel(time=slice(a, a + 0.2)).max()) for a in (0.1, 0.3))
+    assert later < 0.7 * soon  # undamped it keeps 99 % of it
 
 
 def test_a_slow_lean_tips_where_the_statics_say():
