@@ -199,3 +199,38 @@ def _stance(found):
         posture=line.posture,
         base_rpy=np.radians(line.base_rpy),
     )
+
+
+LEG = """<body name="{name}" pos="{x} {y} 0"><joint name="{name}_hip" axis="0 0 1"/>
+<joint name="{name}_knee" axis="{a} 1 0"/>
+<geom type="capsule" fromto="0 0 0 {x} {y} -0.3" size="0.03" mass="0.2"/></body>"""
+BUG = (
+    '<mujoco model="bug"><worldbody><body name="trunk" pos="0 0 0.5"><freejoint/>'
+    '<geom type="sphere" size="0.15" mass="3"/>'
+    + "".join(
+        LEG.format(name=name, x=x, y=y, a=-1 if x * y > 0 else 1)
+        for name, x, y in (("a", 0.2, 0.2), ("b", -0.2, 0.2), ("c", 0.2, -0.2), ("d", -0.2, -0.2))
+    )
+    + "</body></worldbody></mujoco>"
+)
+
+
+def test_a_leg_whose_tip_has_no_frame_stands_on_its_tip(tmp_path):
+    path = tmp_path / "bug.xml"
+    path.write_text(BUG, encoding="utf-8")
+    found = inspect_robot(path)
+    assert found.line.offsets == {
+        "a": (0.2, 0.2, -0.33),
+        "b": (-0.2, 0.2, -0.33),
+        "c": (0.2, -0.2, -0.33),
+        "d": (-0.2, -0.2, -0.33),
+    }
+    assert sum("its frame is 330 mm over the lowest point" in note for note in found.notes) == 4
+    words = shlex.split(str(found.line))
+    assert words[words.index("--contact-offset") + 1] == "a=0.2:0.2:-0.33"
+    answer = copsense(*words[1:], "--json")
+    assert answer.code == 0, answer.err
+    heights = [contact["position"][2] for contact in answer.json["contacts"]]
+    assert heights == pytest.approx([0.0] * 4, abs=1e-12)
+    # The tips are 0.4 m to either side, not the hips at 0.2 m.
+    assert abs(answer.json["contacts"][0]["position"][0]) == pytest.approx(0.4, abs=0.01)

@@ -36,6 +36,7 @@ class AnalyseLine:
         base_rpy: orientation of the base [deg].
         posture: joint -> position [rad].
         package_dirs: as given.
+        offsets: frame -> place of its contact in it [m], of points beside their frames.
     """
 
     source: str
@@ -46,16 +47,19 @@ class AnalyseLine:
     base_rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
     posture: Mapping[str, float] = field(default_factory=dict)
     package_dirs: tuple[str, ...] = ()
+    offsets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Own the posture."""
-        freeze(self, "posture")
+        """Own the posture and the offsets."""
+        freeze(self, "posture", "offsets")
 
     def __str__(self) -> str:
         """The line, quoted for a shell."""
         words = ["copsense", "analyse", self.source]
         for contact in self.contacts:
             words += ["--contact", contact]
+        for frame, place in self.offsets.items():
+            words += ["--contact-offset", f"{frame}=" + ":".join(f"{c:g}" for c in place)]
         if self.contact_at is not None:
             words += ["--contact-at", self.contact_at]
         if self.soles != "collision":
@@ -88,8 +92,12 @@ def lines_to_try(
     contacts = tuple(f.frame if f.kind == "surface" else f"{f.frame}:point" for f in feet)
     at: ContactAt | None = "sole" if surfaces and not unread else None
     sole = _GUESSED if unread else None
+    offsets = {f.frame: f.contact.offset for f in feet if f.kind == "point"}
+    beside = {frame: offset for frame, offset in offsets.items() if any(offset)}
     for posture in postures:
-        yield AnalyseLine(source, contacts, at, soles, sole, base_rpy, posture, package_dirs)
+        yield AnalyseLine(
+            source, contacts, at, soles, sole, base_rpy, posture, package_dirs, beside
+        )
 
 
 def first_that_stands(
@@ -122,7 +130,9 @@ def _stand(robot: Robot, line: AnalyseLine) -> None:
     for text in line.contacts:
         frame, colon, _ = text.rpartition(":")
         point = text.endswith(":point") and bool(colon)
-        contact = Contact(frame, kind="point") if point else Contact(text)
+        contact = Contact(text)
+        if point:
+            contact = Contact(frame, kind="point", offset=line.offsets.get(frame, (0.0, 0.0, 0.0)))
         if line.sole is not None and not point:
             contact = Contact(text, polygon=rectangle(*line.sole))
         contacts.append(contact)

@@ -95,14 +95,20 @@ def find_feet(
     feet = [_foot(robot, q, data, j, clouds.get(j), geometry) for j in chosen]
     if len(feet) > 2:
         feet = [f if f.sole is None or _width(f.sole) > _BALL else _as_point(f) for f in feet]
+    placed = []
     for foot in feet:
-        over = float(data.oMf[robot.frame_id(foot.frame)].translation[2] - foot.middle[2])
+        place = data.oMf[robot.frame_id(foot.frame)]
+        over = float(place.translation[2] - foot.middle[2])
         if foot.kind == "point" and over > _HIGH:
+            x, y, z = (float(c) for c in place.actInv(foot.middle).round(4) + 0.0)
+            tip = replace(foot.contact, kind="point", offset=(x, y, z), rotation=np.eye(3))
+            foot = replace(foot, contact=tip)
             notes += (
-                f"contact {foot.frame!r}: a point contact is at its frame, {over * 1e3:.0f} mm "
-                "over the lowest point of its link. Where that matters, give a frame at the tip "
-                "or, in Python, Contact(offset=...).",
+                f"contact {foot.frame!r}: its frame is {over * 1e3:.0f} mm over the lowest point "
+                "of its link at rest; the contact is put there (--contact-offset).",
             )
+        placed.append(foot)
+    feet = placed
     return tuple(feet), notes
 
 

@@ -116,6 +116,7 @@ class Inspection(ShortRepr):
                         "polygon": None if foot.sole is None else foot.sole.polygon.tolist(),
                         "x_axis": foot.contact.rotation[:, 0].tolist(),
                         "z_axis": foot.contact.normal.tolist(),
+                        "offset": list(foot.contact.offset),
                     }
                     for foot in self.feet
                 ],
