@@ -12,9 +12,8 @@ EQUALITIES = {
         "part of it.",
     ),
     "fixed": (
-        "<joint joint1='l_hip'/>",
-        "equality (joint) of joint 'l_hip' is not used: a joint that is held at a position is "
-        "taken to be held by its motor.",
+        "<joint joint1='l_hip' polycoef='0.2 0 0 0 0'/>",
+        "joint 'l_hip' is held at 0.2 rad or m by an equality.",
     ),
     "bent": (
         "<joint joint1='l_hip' joint2='r_hip' polycoef='0 1 0 2 0'/>",

@@ -14,6 +14,7 @@ from support.driven_files import (
 from support.statics_apart import frame_at
 
 import copsense
+import copsense.closing
 from copsense import minimum_torque, solve_equilibrium
 from copsense.drives import Coupling, Spring
 
@@ -166,3 +167,24 @@ def test_a_loop_is_open_as_far_as_mujoco_says(element):
     if loop.kind == "weld":
         angle = np.linalg.norm(pin.log3(b.rotation.T @ a.rotation))
         assert np.linalg.norm(violated[3:]) == pytest.approx(np.sin(angle / 2), abs=1e-9)
+
+
+def test_an_equality_of_one_joint_pins_it_as_mujoco_does():
+    text = biped(tail="<equality><joint joint1='l_hip' polycoef='-0.3 0.7 0 0 0'/></equality>")
+    robot = copsense.load_robot(text)
+    (coupling,) = robot.drives.couplings
+    assert (coupling.joint, coupling.ratio) == ("l_hip", 0.0)
+    random = np.random.default_rng(4)
+    q = robot.configuration({joint: float(random.normal()) for joint in robot.joint_names})
+    stance = copsense.Stance(robot, q, [copsense.Contact("l_foot")], check=False)
+    model, data = at_stance(text, stance)
+    _, violated = rows(model, data)
+    off = robot.joint_position(q, "l_hip") - coupling.offset
+    assert np.abs(violated).max() == pytest.approx(abs(off), abs=1e-12)
+    # It cannot move, has no motor, and what holds it is the row's force.
+    assert "l_hip" not in robot.torque_names
+    index = robot.velocity_index("l_hip")
+    closed = copsense.closing.close(robot, q)
+    assert robot.joint_position(closed, "l_hip") == pytest.approx(coupling.offset, abs=1e-15)
+    here = copsense.Stance(robot, closed, [copsense.Contact("l_foot")], check=False)
+    assert np.abs(here.admissible_motions[index]).max() < 1e-12

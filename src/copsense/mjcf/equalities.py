@@ -1,7 +1,7 @@
 """equalities: loops and couplings of a compiled MJCF.
 
 connect, weld    a loop
-joint            a coupling, q_1 - ref_1 = c_0 + c_1 (q_2 - ref_2)
+joint            a coupling, q_1 - ref_1 = c_0 + c_1 (q_2 - ref_2); of one joint c_1 = 0, a pin
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ _CONNECT, _WELD = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
 _JOINT, _TENDON = int(mujoco.mjtEq.mjEQ_JOINT), int(mujoco.mjtEq.mjEQ_TENDON)
 # What couplings are between, which MuJoCo does not repeat in `eq_objtype`.
 _BETWEEN = {_JOINT: int(mujoco.mjtObj.mjOBJ_JOINT), _TENDON: int(mujoco.mjtObj.mjOBJ_TENDON)}
+_ONE = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 _SAME = 1e-12
 
 
@@ -51,7 +52,8 @@ class Equalities:
             own = self.tree.bodies.keys()
             if not mj.eq_active0[e] or not any(bodies & own for _, bodies in ends):
                 continue
-            inside = all(bodies and bodies <= own for _, bodies in ends)
+            pins = kind == _JOINT and int(mj.eq_obj2id[e]) < 0
+            inside = pins or all(bodies and bodies <= own for _, bodies in ends)
             why = "it joins the robot to what is not part of it" if kind != _JOINT else ""
             if inside and kind in (_CONNECT, _WELD):
                 loops.append(self._loop(e, kind, of))
@@ -63,8 +65,6 @@ class Equalities:
                 elif coupling is not None:
                     couplings[coupling.joint] = coupling
                     continue
-            elif kind == _JOINT:
-                why = "a joint that is held at a position is taken to be held by its motor"
             elif kind not in (_CONNECT, _WELD):
                 why = "copsense knows connect, weld and joint"
             name = f" {mj.eq(e).name!r}" if mj.eq(e).name else ""
@@ -143,10 +143,22 @@ class Equalities:
         if np.any(polynomial[2:]):
             degree = int(np.flatnonzero(polynomial)[-1])
             return None, f"its polynomial is of degree {degree}, copsense knows straight lines"
-        if first not in self.tree.joints or second not in self.tree.joints:
+        if first not in self.tree.joints or (second >= 0 and second not in self.tree.joints):
             return None, "a joint of the base is no joint of the robot"
+        if second < 0:
+            return self._pinned(first, float(polynomial[0]))
         rest = mj.qpos0[mj.jnt_qposadr[first]], mj.qpos0[mj.jnt_qposadr[second]]
         constant, ratio = float(polynomial[0]), float(polynomial[1])
         offset = float(rest[0]) + constant - ratio * float(rest[1])
         names = self.tree.name_of(first), self.tree.name_of(second)
         return Coupling(names[0], names[1], ratio, offset), ""
+
+    def _pinned(self, joint: int, constant: float) -> tuple[Coupling | None, str]:
+        """A joint held where it is: it follows another by nothing, q = 0 q_of + b."""
+        others = [j for j in self.tree.joints if j != joint and self.mj.jnt_type[j] in _ONE]
+        if not others:
+            return None, "it is the only joint, and stays where the posture has it"
+        at = float(self.mj.qpos0[self.mj.jnt_qposadr[joint]]) + constant
+        names = self.tree.name_of(joint), self.tree.name_of(others[0])
+        self.notes.append(f"joint {names[0]!r} is held at {at:.4g} rad or m by an equality.")
+        return Coupling(names[0], names[1], 0.0, at), ""

@@ -217,7 +217,7 @@ def _base_turn(robot: Robot, rest: Float[np.ndarray, " nq"]) -> tuple[float, flo
 def _joints(robot: Robot) -> tuple[InspectedJoint, ...]:
     lower, upper = robot.position_limits
     motors = dict(zip(robot.torque_names, robot.effort_limits.tolist(), strict=True))
-    follows = {coupling.joint: coupling.of for coupling in robot.drives.couplings}
+    follows = {each.joint: each.of for each in robot.drives.couplings if each.ratio}
     raw = np.asarray(robot.model.upperEffortLimit)[robot.base_nv :]
     found = []
     for i, name in enumerate(robot.dof_names):
