@@ -17,6 +17,7 @@ _AXES = (
     "about z (yaw)",
 )
 _STILL = 1e-4  # m, per unit of motion: what moves the CoM less leaves it where it is
+_ALIKE = 0.02  # singular values under which constraints all but say the same; usual are 0.05 up
 _SHARE = 0.01  # share of a lost direction from which a rotation is said to be missing
 
 
@@ -97,9 +98,9 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
 def freedom_notes(stance: Stance) -> tuple[str, ...]:
     """What the contacts hold twice, or hold that one would expect to move; empty where nothing."""
-    rows = len(stance.constraints)
+    rows, repeated = len(stance.constraints), closure_notes(stance)
     if stance.rank == rows:
-        return ()
+        return repeated
     held = [f"CoM's {'xyz'[axis]}" for axis in held_com_axes(stance) if axis < 2]
     still = f"; they hold the {' and '.join(held)} fast" if held else ""
     why = "; ".join(missing_joints(stance))
@@ -107,6 +108,26 @@ def freedom_notes(stance: Stance) -> tuple[str, ...]:
         f"The contacts hold {stance.rank} of {rows} directions: {rows - stance.rank} of them "
         f"{'is' if rows - stance.rank == 1 else 'are'} held twice, by forces that the motors do "
         f"not feel{still}." + (f" {why[0].upper()}{why[1:]}." if why else ""),
+        *repeated,
+    )
+
+
+def closure_notes(stance: Stance) -> tuple[str, ...]:
+    """Whether loops and couplings all but repeat what the contacts hold; empty where they do not.
+
+    What repeats it exactly counts as held twice; what nearly does carries forces that rigid statics
+    tell, and that nothing real, or simulated, shares so.
+    """
+    if stance.closures is None:
+        return ()
+    sizes = np.linalg.svd(stance.constraints, compute_uv=False)
+    least = float(sizes[sizes > RANK_TOLERANCE].min(initial=np.inf))
+    if least > _ALIKE:
+        return ()
+    return (
+        f"Loops and couplings all but repeat what the contacts hold (smallest singular value "
+        f"{least:.1e}): links and ground that yield by a little share the forces between them "
+        "otherwise than these rigid ones, and feet may creep.",
     )
 
 

@@ -12,7 +12,9 @@ import xarray as xr
 from support.commands import copsense
 from support.driven_files import sprung_rods
 
-from copsense import load_stance, minimum_torque, solve_equilibrium
+from copsense import Drives, load_stance, minimum_torque, solve_equilibrium
+from copsense.drives import Coupling
+from copsense.freedom import closure_notes
 from copsense.simulation import Recording
 
 
@@ -296,3 +298,11 @@ def test_a_joint_without_a_motor_that_nothing_holds_is_named_before_the_run(rod_
     said = copsense("balance", robot, *one, "--passive", "l_knee").error
     assert "lacks" in said
     assert "for want of a motor" in said
+
+
+def test_a_coupling_that_all_but_repeats_the_contacts_is_said_to():
+    run = ("balance", "icub", "--duration", 0.005)
+    said = copsense(*run, "--couple", "r_hip_yaw=-1*l_hip_yaw").err
+    assert "note: Loops and couplings all but repeat what the contacts hold" in said
+    drives = Drives(couplings=(Coupling("r_hip_yaw", "l_hip_yaw", 1.0),))
+    assert closure_notes(load_stance("icub", drives=drives)) == ()

@@ -27,7 +27,13 @@ from copsense.cli.disturbance_options import (
     read_signal,
 )
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import PICTURES, echo_json, echo_written, progress_bar
+from copsense.cli.printing import (
+    PICTURES,
+    echo_json,
+    echo_notes,
+    echo_written,
+    progress_bar,
+)
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
@@ -151,6 +157,7 @@ def balance(
             progress=update,
             stop=stop,
         )
+    echo_notes(note for note in recording.notes if note not in stance.robot.notes)
     recording = recording.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
     if output is not None:
         recording.save(output, overwrite=force)
