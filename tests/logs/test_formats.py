@@ -1,10 +1,12 @@
 """What a simulation recorded, written in every format and read back, is what it was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support import log_files
 
-from copsense.logs import LogMap, compare_log, read_log
+from copsense.logs import LogMap, WrenchMap, compare_log, read_log
 from copsense.logs.log_statics import wrench_cops
 from copsense.logs.opening import open_log_file
 from copsense.logs.recognition import recognise
@@ -83,6 +85,26 @@ def test_force_plates_come_back(icub, data, tmp_path):
         found = block[f"plate {k + 1}"]
         # The format holds numbers of 32 bits.
         np.testing.assert_allclose(found, np.hstack([w[:, :3], moment]), rtol=0, atol=2e-4)
+
+
+def test_plates_in_a_file_of_their_own(read_back, icub, data):
+    """The laboratory's plates began 0.4 s after the robot's log, on a clock of their own."""
+    read_back("log.csv")
+    late = log_files.first(data, 401, begin=100)
+    log_files.write_c3d(read_back.folder / "plates.c3d", late)
+    said = recognise(open_log_file(read_back.folder / "log.csv"), icub.robot, data.contacts)
+    plates = tuple(
+        WrenchMap(n, {"wrench": f"plate {k + 1}"}, kind="plate", file="plates.c3d", starts=0.4)
+        for k, n in enumerate(log_files.PLATES)
+    )
+    own = LogMap.from_dict(replace(said, wrenches=plates).to_dict())
+    log = read_back("log.csv", log_map=own)
+    for name in log_files.PLATES:
+        normal = log.wrench(name).values[:, 2]
+        expected = data.w[:, data.contacts.index(name), 2]
+        np.testing.assert_allclose(normal[100:501], expected[100:501], atol=1e-3)
+        assert np.isnan(normal[:99]).all()
+        assert np.isnan(normal[502:]).all()
 
 
 def test_one_mcap_file_is_a_bag(read_back, data):

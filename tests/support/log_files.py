@@ -23,9 +23,11 @@ def of_recording(recording):
     )
 
 
-def first(data, rows):
-    """The first rows alone."""
-    kept = {k: v[:rows] for k, v in vars(data).items() if k not in ("joints", "contacts")}
+def first(data, rows, begin=0):
+    """So many rows alone."""
+    kept = {
+        k: v[begin : begin + rows] for k, v in vars(data).items() if k not in ("joints", "contacts")
+    }
     return SimpleNamespace(joints=data.joints, contacts=data.contacts, **kept)
 
 

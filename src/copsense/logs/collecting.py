@@ -10,14 +10,14 @@ from jaxtyping import Float
 from copsense.errors import LogReadError
 from copsense.logs.channel import LogFile, Progress
 
-LARGEST = 12_000_000  # numbers that are kept in memory: 100 MB
+LARGEST = 8_000_000  # numbers that are kept in memory: 64 MB
 
 
 def collect(
     file: LogFile,
     keys: Sequence[str],
     clocks: Mapping[str, str],
-    rate: float | None,
+    rates: Mapping[str, float],
     advance: Progress,
 ) -> dict[str, Float[np.ndarray, "N k"]]:
     """Channels by key.
@@ -26,13 +26,15 @@ def collect(
         file: where they are.
         keys: of the channels, their clocks' among them.
         clocks: key -> key of the clock; a clock is its own.
-        rate: rows a second to keep, each the mean of the samples around it; None for all.
+        rates: clock -> rows per unit of it to keep, each the mean of the samples around it; all
+            rows of the others.
         advance: called with the bytes read.
 
     Raises:
-        LogReadError: the file is damaged, or larger than memory should be at this rate.
+        LogReadError: the file is damaged.
+        TooLargeError: it has more numbers than are kept in memory.
     """
-    bins = {clock: _Bins(rate) for clock in set(clocks.values())}
+    bins = {clock: _Bins(rates.get(clock)) for clock in set(clocks.values())}
     held = 0
     for block in file.blocks(keys, advance):
         for clock, thinner in bins.items():

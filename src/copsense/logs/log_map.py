@@ -22,7 +22,7 @@ from typing import Any, Literal, get_args
 
 import tomli_w
 
-from copsense.arrays import finite_array
+from copsense.arrays import finite_array, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.files import check_output, checked_path, file_at, write_beside
@@ -80,6 +80,9 @@ class WrenchMap:
         kind: as in `WrenchSeries`.
         sign: -1 where the log holds what the robot does to the environment.
         offset: six numbers that are taken off what was read, before the sign [N, Nm].
+        file: another file that holds the sensor, such as the laboratory's force plates, seen from
+            the log; empty for the log itself.
+        starts: how long after the log's first sample that file's first one is [s].
     """
 
     contact: str
@@ -89,6 +92,8 @@ class WrenchMap:
     kind: SensorKind = "sole"
     sign: float = 1.0
     offset: tuple[float, ...] = (0.0,) * 6
+    file: str = ""
+    starts: float = 0.0
 
     def __post_init__(self) -> None:
         """Check components, kind, sign and offset."""
@@ -113,6 +118,7 @@ class WrenchMap:
             raise InvalidInputError(f"the sign of {self.name!r} is {self.sign}. Give 1 or -1.")
         six = finite_array(self.offset, f"the offset of {self.name!r}", (6,), "force, moment")
         object.__setattr__(self, "offset", tuple(six.tolist()))
+        finite_number(self.starts, f"when the file of {self.name!r} starts [s]")
 
 
 @dataclass(frozen=True)
@@ -190,6 +196,7 @@ class LogMap:
                 | dict(w.keys)
                 | ({"sign": int(w.sign)} if w.sign != 1 else {})
                 | ({"offset": list(w.offset)} if any(w.offset) else {})
+                | ({"file": w.file, "starts": w.starts} if w.file else {})
                 for w in self.wrenches
             ],
         }
@@ -278,7 +285,7 @@ class LogMap:
 
 
 def _wrench(data: Mapping[str, Any]) -> WrenchMap:
-    own = ("name", "contact", "frame", "kind", "sign", "offset")
+    own = ("name", "contact", "frame", "kind", "sign", "offset", "file", "starts")
     known(data, (*own, *COMPONENTS, "wrench"), "[[wrenches]]")
     if not data.get("contact"):
         raise InvalidInputError(

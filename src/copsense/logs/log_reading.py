@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,20 +12,18 @@ from jaxtyping import Float
 from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.logs.channel import LogFile, Progress, no_progress
-from copsense.logs.collecting import TooLargeError, collect
 from copsense.logs.finding import Finding, dated, stretches
 from copsense.logs.log import Log, WrenchSeries
-from copsense.logs.log_map import COMPONENTS, TIME_UNITS, BaseMap, LogMap
-from copsense.logs.one_clock import Clock, equal_steps, gaps, in_gap, on_clock, ordered
+from copsense.logs.log_map import COMPONENTS, BaseMap, LogMap, WrenchMap
+from copsense.logs.one_clock import Clock, equal_steps, gaps, in_gap
 from copsense.logs.opening import open_log_file
 from copsense.logs.recognition import recognise
 from copsense.logs.rotations import rotation_quaternions
 from copsense.logs.selection import Column, joint_columns, one_column, several_columns
+from copsense.logs.signals import Signals
 from copsense.robot import Robot
 
 _DEAD = 0.5  # s for which a force sensor repeats one number until it counts as dead
-_THINNED = 100.0  # Hz that a log is thinned to where it is too large for memory
-_ROWS_OF_FILE = ""  # the clock of a file that has none
 
 
 def read_log(
@@ -63,24 +60,17 @@ def read_log(
     chosen = log_map if isinstance(log_map, LogMap | None) else LogMap.load(log_map)
     if chosen is None:
         chosen = recognise(file, robot, contacts)
-    return _Reading(file, chosen, robot, rate, advance).log()
+    return _Reading(file, chosen, robot).log(rate, advance)
 
 
 class _Reading:
     """The steps from a file and its mapping to a log."""
 
-    def __init__(
-        self,
-        file: LogFile,
-        log_map: LogMap,
-        robot: Robot | None,
-        rate: float | None,
-        advance: Progress,
-    ) -> None:
+    def __init__(self, file: LogFile, log_map: LogMap, robot: Robot | None) -> None:
         self.file, self.map, self.robot = file, log_map, robot
-        self.rate, self.advance = rate, advance
+        self.signals = Signals(file, log_map.time, log_map.time_unit, log_map.rate)
+        self.others: dict[str, Signals] = {}
         self.findings: list[Finding] = []
-        self.notes: list[str] = [f"read by {log_map.origin}"]
         joints = log_map.joints
         self.columns = {
             what: joint_columns(file, spec, joints.names, what) if spec else {}
@@ -90,15 +80,35 @@ class _Reading:
                 ("torques", joints.torques),
             )
         }
-        self.sensors = [self._sensor(w.keys) for w in log_map.wrenches]
+        for columns in self.columns.values():
+            self.signals.want(columns.values())
+        self.sensors = [self._sensor(w) for w in log_map.wrenches]
         self.base = self._base(log_map.base)
+        self.signals.want(self.base)
 
-    def _sensor(self, given: Mapping[str, str]) -> dict[int, Column]:
+    def _sensor(self, given: WrenchMap) -> dict[int, Column]:
         """Component 0..5 -> column."""
-        if "wrench" in given:
-            six = several_columns(self.file, given["wrench"], 6, "a wrench")
-            return dict(enumerate(six))
-        return {COMPONENTS.index(k): one_column(self.file, v) for k, v in given.items()}
+        signals = self._signals(given)
+        if "wrench" in given.keys:
+            six = several_columns(signals.file, given.keys["wrench"], 6, "a wrench")
+            found = dict(enumerate(six))
+        else:
+            found = {
+                COMPONENTS.index(component): one_column(signals.file, reference)
+                for component, reference in given.keys.items()
+            }
+        signals.want(found.values())
+        return found
+
+    def _signals(self, given: WrenchMap) -> Signals:
+        """Where a sensor's signals are: in the log, or in a file of its own."""
+        if not given.file:
+            return self.signals
+        if given.file not in self.others:
+            file = open_log_file(self.file.path.parent / given.file)
+            time = self.map.time if self.map.time in file.channels else ""
+            self.others[given.file] = Signals(file, time, self.map.time_unit, 0.0)
+        return self.others[given.file]
 
     def _base(self, base: BaseMap | None) -> list[Column]:
         if base is None:
@@ -107,51 +117,40 @@ class _Reading:
         place = several_columns(self.file, base.position, 3, "the base's position")
         return place + several_columns(self.file, base.rotation, size, "the base's rotation")
 
-    def log(self) -> Log:
+    def log(self, rate: float | None, advance: Progress) -> Log:
         """Read, bring onto one clock, and check."""
-        used = {c.key for columns in self.columns.values() for c in columns.values()}
-        used |= {c.key for sensor in self.sensors for c in sensor.values()}
-        used |= {c.key for c in self.base}
-        clocks = {key: self._clock_of(key) for key in used}
-        clocks |= {clock: clock for clock in set(clocks.values()) if clock}
-        for key, clock in clocks.items():  # as mapped, for a reader to keep rows together
-            own = self.file.channels[key]
-            meaning = "time" if key == clock else own.meaning
-            self.file.channels[key] = replace(own, clock=clock, meaning=meaning)
-        self.data = self._collected(clocks)
-        self.clocks = {clock: self._clock(clock) for clock in set(clocks.values())}
-        self.clock_of = clocks
+        notes = [f"read by {self.map.origin}"]
+        for signals in (self.signals, *self.others.values()):
+            signals.read(rate, advance)
+            self.findings += signals.findings
+            notes += signals.notes
         names = self._joint_names()
-        first = self.clock_of[next(iter(self.columns["positions"].values())).key]
-        main = self.clocks[first]
+        main = self.signals.clock(self.columns["positions"][names[0]])
         times = equal_steps(main)
         self.findings += gaps(main, "the joints")
+        self.in_gap = in_gap(main, times)
         if times is not main.times:
-            self.notes.append(
-                "the joints' clock has uneven steps: resampled linearly, to "
-                f"{1 / (times[1] - times[0]):.4g} Hz"
+            step = float(times[1] - times[0])
+            notes.append(
+                f"the joints' clock has uneven steps: resampled linearly, to {1 / step:.4g} Hz"
             )
         positions = self._joints("positions", names, times)
         assert positions is not None
-        wrenches = [self._wrench(i, times, first) for i in range(len(self.map.wrenches))]
-        base = self._base_rows(times) if self.base else None
-        start = float(times[0])
-        times = times - start
-        self.in_gap = in_gap(main, times + start)
-        self._missing("the joints", positions, times)
+        own = times - times[0]
+        self._missing("the joints", positions, own)
         log = Log(
             self.file.path.name,
-            times,
+            own,
             tuple(self.map.joints.rename.get(n, n) for n in names),
             positions,
-            tuple(self._checked(w, times) for w in wrenches),
-            self._joints("velocities", names, times + start),
-            self._joints("torques", names, times + start),
-            base,
+            tuple(self._wrench(i, times, main) for i in range(len(self.sensors))),
+            self._joints("velocities", names, times),
+            self._joints("torques", names, times),
+            self._base_rows(times) if self.base else None,
             self.map.base.frame if self.map.base is not None else "",
-            start,
+            float(times[0]),
             tuple(self.findings),
-            tuple(self.notes + self.file.notes),
+            tuple(notes),
         )
         twice = [n for n in log.joint_names if log.joint_names.count(n) > 1]
         if twice:
@@ -159,59 +158,6 @@ class _Reading:
                 f"two signals of the log are called {twice[0]!r}. Rename or ignore one of them."
             )
         return log
-
-    def _clock_of(self, key: str) -> str:
-        """Key of a channel's clock: its own, or the mapping's."""
-        own = self.file.channels[key].clock
-        # A mapping's clock is for signals that have none, and takes the place of a guess.
-        if self.map.time and own in ("", self.map.time):
-            return one_column(self.file, self.map.time).key
-        if own or self.map.rate:
-            return own
-        if self.map.time:
-            return one_column(self.file, self.map.time).key
-        raise InvalidInputError(
-            f"the signal {key!r} of {self.file.path.name} has no clock. Give [time] key, or "
-            "rate_Hz where its rows are at equal steps."
-        )
-
-    def _collected(self, clocks: dict[str, str]) -> dict[str, np.ndarray]:
-        keys = sorted(clocks)
-        scale = {c: 1.0 / self._second(c) for c in clocks.values() if c}
-        units = set(scale.values())
-        rate = None if self.rate is None else self.rate / (units.pop() if len(units) == 1 else 1.0)
-        try:
-            return collect(self.file, keys, clocks, rate, self.advance)
-        except TooLargeError:
-            if self.rate is not None:
-                raise
-            self.rate = _THINNED
-            self.notes.append(
-                f"too large for memory: read at {_THINNED:g} Hz, each row the mean of the samples "
-                "around it"
-            )
-            return self._collected(clocks)
-
-    def _second(self, clock: str) -> float:
-        """A unit of a clock in seconds."""
-        channel = self.file.channels[clock]
-        unit = self.map.time_unit if clock == _key(self.map.time) else channel.unit_time
-        return TIME_UNITS[unit]
-
-    def _clock(self, clock: str) -> Clock:
-        what = "the log" if clock in ("", _key(self.map.time)) else clock
-        if clock == _ROWS_OF_FILE:
-            rows = len(next(r for k, r in self.data.items() if self.clock_of_key(k) == ""))
-            times = np.arange(rows) / self.map.rate
-        else:
-            times = self.data[clock][:, 0] * self._second(clock)
-        found = ordered(clock, times, what)
-        self.findings += found.findings
-        return found
-
-    def clock_of_key(self, key: str) -> str:
-        """Key of a collected channel's clock."""
-        return self.file.channels[key].clock
 
     def _joint_names(self) -> list[str]:
         """The joints of the log, those to be ignored left out."""
@@ -235,7 +181,7 @@ class _Reading:
         for key in dict.fromkeys(c.key for c in columns.values()):
             at = [i for i, n in enumerate(names) if n in columns and columns[n].key == key]
             if at:
-                rows = self._rows(key, times)
+                rows = self.signals.at(key, times)
                 found[:, at] = rows[:, [columns[names[i]].index for i in at]]
         if what != "torques":
             found[:, [i for i, n in enumerate(names) if self._turns(n)]] *= self._angle(columns)
@@ -255,25 +201,39 @@ class _Reading:
             return True
         return self.robot.joint_unit(joint) == "rad"
 
-    def _rows(self, key: str, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N k"]:
-        clock = self.clocks[self.clock_of[key]]
-        return on_clock(clock, self.data[key][clock.rows], times)
-
-    def _wrench(self, i: int, times: Float[np.ndarray, " N"], main: str) -> WrenchSeries:
+    def _wrench(self, i: int, times: Float[np.ndarray, " N"], main: Clock) -> WrenchSeries:
+        """What a sensor measured, without the rows in which it was dead."""
         given, columns = self.map.wrenches[i], self.sensors[i]
+        signals, any_of = self._signals(given), next(iter(columns.values()))
+        clock, later = signals.clock(any_of), 0.0
+        if given.file:
+            later = float(clock.times[0] - times[0]) - given.starts
         values = np.full((len(times), 6), np.nan)
         for component, column in columns.items():
-            values[:, component] = self._rows(column.key, times)[:, column.index]
-            values[:, component] -= given.offset[component]
-        values *= given.sign
-        clock = self.clock_of[next(iter(columns.values())).key]
-        if clock != main:
-            self.findings += gaps(self.clocks[clock], given.name)
+            read = signals.at(column.key, times, later)[:, column.index]
+            values[:, component] = given.sign * (read - given.offset[component])
+        if clock is not main:
+            self.findings += gaps(clock, given.name)
+        measured = np.isfinite(values).any(axis=0)
+        own = times - times[0]
+        self._missing(f"the sensor {given.name!r}", values[:, measured], own)
+        dead = _repeating(values[:, measured], own)
+        found = dated(
+            "dead sensor",
+            given.name,
+            f"the sensor {given.name!r} repeats one number at {{rows}} rows, {{where}}: it was "
+            "dead, or the foot in the air, and these rows count as missing.",
+            dead,
+            own,
+        )
+        if found is not None:
+            self.findings.append(found)
+            values[dead] = np.nan
         return WrenchSeries(given.name, given.contact, given.frame, given.kind, values)
 
     def _base_rows(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N 7"]:
         assert self.map.base is not None
-        read = np.column_stack([self._rows(c.key, times)[:, c.index] for c in self.base])
+        read = np.column_stack([self.signals.at(c.key, times)[:, c.index] for c in self.base])
         turned = rotation_quaternions(read[:, 3:], self.map.base.representation)
         return np.hstack([read[:, :3], turned])
 
@@ -289,25 +249,6 @@ class _Reading:
         if found is not None:
             self.findings.append(found)
 
-    def _checked(self, series: WrenchSeries, times: np.ndarray) -> WrenchSeries:
-        """A sensor's rows without those in which it was dead."""
-        values = np.array(series.values)
-        measured = np.isfinite(values).any(axis=0)
-        self._missing(f"the sensor {series.name!r}", values[:, measured], times)
-        dead = _repeating(values[:, measured], times)
-        found = dated(
-            "dead sensor",
-            series.name,
-            f"the sensor {series.name!r} repeats one number at {{rows}} rows, {{where}}: it was "
-            "dead, or the foot in the air, and these rows count as missing.",
-            dead,
-            times,
-        )
-        if found is not None:
-            self.findings.append(found)
-            values[dead] = np.nan
-        return WrenchSeries(series.name, series.contact, series.frame, series.kind, values)
-
 
 def _repeating(values: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Rows in stretches of `_DEAD` and longer in which no number changes at all."""
@@ -318,7 +259,3 @@ def _repeating(values: np.ndarray, times: np.ndarray) -> np.ndarray:
             if times[last] - times[first - 1] >= _DEAD:
                 dead[first - 1 : last + 1] = True
     return dead
-
-
-def _key(reference: str) -> str:
-    return reference.partition("[")[0]
