@@ -106,7 +106,7 @@ def compare_log(
         stand = partial(_on_feet, model, feet)
     else:
         raise InvalidInputError(f"the base is {base!r}. Give 'feet' or 'recorded'.")
-    motion, window = _motion(log, model, feet, stand, known)
+    motion, window = _motion(log, model, stand, known)
     wrenches = ground_wrenches(log, model, feet, motion, base == "recorded")
     findings += audit_forces(log, model, feet, wrenches[:, :, 2])
     findings += audit_feet(log, model, feet, motion)
@@ -188,15 +188,20 @@ def _contacts(
 
 
 def _on_feet(
-    robot: Robot, contacts: Sequence[Contact], q: Float[np.ndarray, "N nq"], window: int
+    robot: Robot, contacts: Sequence[Contact], q: Float[np.ndarray, "N nq"], _: int, every: int
 ) -> Float[np.ndarray, "N nq"]:
     return stand_on_feet(robot, contacts, q)
 
 
 def _recorded(
-    robot: Robot, base: np.ndarray, frame: str, q: Float[np.ndarray, "N nq"], window: int
+    robot: Robot,
+    base: np.ndarray,
+    frame: str,
+    q: Float[np.ndarray, "N nq"],
+    window: int,
+    every: int,
 ) -> Float[np.ndarray, "N nq"]:
-    return put_on_base(robot, q, base, frame, window)
+    return put_on_base(robot, q, base[::every], frame, window)
 
 
 def _locked(whole: Robot, model: Robot, contacts: Sequence[Contact]) -> list[str]:
@@ -222,7 +227,6 @@ def _locked(whole: Robot, model: Robot, contacts: Sequence[Contact]) -> list[str
 def _motion(
     log: Log,
     robot: Robot,
-    contacts: Sequence[Contact],
     stand: Stand,
     known: Bool[np.ndarray, " N"],
 ) -> tuple[LogMotion, float]:
@@ -230,7 +234,7 @@ def _motion(
     rows = joint_rows(log, robot)
     # A look at the sway, without smoothing, says how much smoothing it bears.
     every = max(1, len(rows) // 1000)
-    com = _com(robot, stand(rows, 1)[::every])
+    com = _com(robot, stand(rows[::every].copy(), 1, every))
     frequency = math.nan
     if np.ptp(com[:, :2], axis=0).max() > _STILL and len(com) >= _LEAST:
         axis = int(np.argmax(np.ptp(com[:, :2], axis=0)))

@@ -23,8 +23,9 @@ from copsense.robot import Robot
 
 SHARE = 0.1  # of the sway's period that the filter is long
 LONGEST = 0.5  # s, and never longer
-# Joint rows (N, nq), and samples to smooth over -> configurations with the base in place.
-Stand = Callable[[np.ndarray, int], np.ndarray]
+# Joint rows (N, nq), samples to smooth over, and which of the log's rows they are (every first,
+# second ...) -> the same array with the base in place.
+Stand = Callable[[np.ndarray, int, int], np.ndarray]
 _LEAST = 5  # samples: a cubic through fewer smooths nothing
 
 
@@ -97,7 +98,7 @@ def joint_rows(log: Log, robot: Robot) -> Float[np.ndarray, "N nq"]:
 def stand_on_feet(
     robot: Robot, contacts: Sequence[Contact], q: Float[np.ndarray, "N nq"]
 ) -> Float[np.ndarray, "N nq"]:
-    """The configurations with the base where the contacts put it.
+    """The configurations with the base where the contacts put it, in the array given.
 
     The first contact with a surface stands level at the origin. On points alone the base is where
     all of them fit best to where they are on average, their common plane level.
@@ -118,19 +119,18 @@ def stand_on_feet(
             f"{len(contacts)} point contact(s) do not say where the base is. Give three or more, "
             "or base='recorded' with a log that has it."
         )
-    found = np.array(q)
     points = np.empty((len(q), len(contacts), 3))
     for i, row in enumerate(q):
         pin.forwardKinematics(model, data, row)
         poses = [data.oMi[joint] * place for joint, place in places]
         points[i] = [pose.translation for pose in poses]
         if surface is not None:
-            _put(found[i], poses[surface].inverse())
+            _put(q[i], poses[surface].inverse())
     if surface is None:
         target = _levelled(points[0] if len(q) == 1 else _average(points))
         for i in range(len(q)):
-            _put(found[i], _fit(points[i], target))
-    return found
+            _put(q[i], _fit(points[i], target))
+    return q
 
 
 def put_on_base(
@@ -140,7 +140,7 @@ def put_on_base(
     frame: str,
     window: int,
 ) -> Float[np.ndarray, "N nq"]:
-    """The configurations with the base as recorded, of one of its frames or the root link.
+    """The configurations with the base as recorded, in the array given.
 
     Args:
         robot: the robot.
@@ -164,13 +164,13 @@ def put_on_base(
         at = own.placement.inverse()
     from scipy.signal import savgol_filter
 
-    found, poses = np.array(q), bridged(base)
+    poses = bridged(base)
     if window > 3:
         poses = savgol_filter(poses, window, 3, axis=0)
-    for row, pose in zip(found, poses, strict=True):
+    for row, pose in zip(q, poses, strict=True):
         turn = pin.Quaternion(np.array(pose[3:])).normalized()
         _put(row, pin.SE3(turn.matrix(), np.array(pose[:3])) * at)
-    return found
+    return q
 
 
 def smooth_motion(
@@ -185,7 +185,7 @@ def smooth_motion(
 
     Args:
         robot: the robot.
-        q: joint rows as recorded, gaps bridged (N, nq).
+        q: joint rows as recorded, gaps bridged (N, nq); overwritten.
         window: of the filter, samples.
         step: from row to row [s].
         stand: puts the base in place, after the joints were smoothed.
@@ -202,13 +202,12 @@ def smooth_motion(
             "longer log."
         )
     model = robot.model
-    rows = np.array(q)
-    rows[:, 7:] = savgol_filter(rows[:, 7:], window, 3, axis=0)
+    q[:, 7:] = savgol_filter(q[:, 7:], window, 3, axis=0)
     for joint in list(model.joints)[2:]:
         if joint.nq == 2:
-            pair = rows[:, joint.idx_q : joint.idx_q + 2]
+            pair = q[:, joint.idx_q : joint.idx_q + 2]
             pair /= np.linalg.norm(pair, axis=1, keepdims=True)
-    configurations = stand(rows, window)
+    configurations = stand(q, window, 1)
     last = len(q) - 1
     v = np.empty((len(q), model.nv))
     for i in range(len(q)):
