@@ -2,13 +2,15 @@
 
 import numpy as np
 import pytest
+from support.commands import copsense as command
 
 from copsense.logs import compare_log, read_log
+from copsense.logs.log_motion import stand_on_feet
 
 
 @pytest.fixture(scope="module")
 def found(sway_file, icub):
-    return compare_log(read_log(sway_file), icub, skip=0.4)
+    return compare_log(read_log(sway_file), icub, skip=0.4, postures=200)
 
 
 def test_load_moves_as_minimum_torque_says_in_motion(found):
@@ -36,13 +38,33 @@ def test_base_from_the_feet_is_the_true_one(found, sway_file, icub):
     np.testing.assert_allclose(own, true, atol=2e-4)
 
 
+def test_base_on_points_alone(stance_of):
+    """Solo stands on four points: joints alone give back how it stood, to where and which way."""
+    solo = stance_of("solo12")
+    q = np.tile(solo.q, (3, 1))
+    q[:, :7] = (1.0, 2.0, 3.0, 0.5, 0.5, 0.5, 0.5)
+    found = solo.at(stand_on_feet(solo.robot, solo.contacts, q)[1])
+    np.testing.assert_allclose(found.com[2], solo.com[2], atol=1e-9)
+    assert np.ptp([p.translation[2] for p in found.placements]) < 1e-9
+
+
+def test_the_command_draws_and_writes_its_mapping(sway_file, tmp_path):
+    options = ("--robot", "icub", "--postures", 40, "--skip", "0.4s")
+    picture, mapping = tmp_path / "log.png", tmp_path / "map.toml"
+    done = command("log", sway_file, *options, "--plot", picture, "--save-map", mapping)
+    assert done.code == 0, done.err
+    assert "minimum-torque, in motion" in done.out
+    assert picture.stat().st_size > 10_000
+    again = command("log", sway_file, *options, "--map", mapping, "--json").json
+    first = command("log", sway_file, *options, "--json").json
+    assert again["slopes"] == first["slopes"]
+
+
 def test_nothing_is_found_wrong(found):
     assert found.findings == ()
 
 
-def test_figure_and_words(found):
-    figure = found.plot()
-    assert len(figure.axes) == 4
+def test_words_and_data(found):
     assert "minimum-torque, in motion" in str(found)
     answer = found.to_dict()
     assert answer["sway"]["frequency"] == pytest.approx(1.0, abs=0.01)

@@ -138,6 +138,6 @@ def test_a_rate_gives_means_of_the_samples(read_back, data):
 
 @pytest.mark.parametrize("name", ["log.parquet", "ros2_mcap"])
 def test_measured_cops_stand_beside_the_criteria(read_back, icub, data, name):
-    found = compare_log(read_back(name), icub, skip=0.4)
+    found = compare_log(read_back(name), icub, skip=0.4, postures=60)
     at = np.searchsorted(data.t - data.t[0], found.times - 1e-4)
     np.testing.assert_allclose(found.cops, data.cop[at], rtol=0, atol=1e-9)

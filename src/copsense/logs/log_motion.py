@@ -127,7 +127,7 @@ def stand_on_feet(
         if surface is not None:
             _put(q[i], poses[surface].inverse())
     if surface is None:
-        target = _levelled(points[0] if len(q) == 1 else _average(points))
+        target = _levelled(_average(points), np.array(pin.centerOfMass(model, data, q[0])))
         for i in range(len(q)):
             _put(q[i], _fit(points[i], target))
     return q
@@ -234,11 +234,11 @@ def _average(points: np.ndarray) -> np.ndarray:
     return np.asarray(np.mean(fitted, axis=0))
 
 
-def _levelled(points: np.ndarray) -> np.ndarray:
-    """The points with their best plane at z = 0, its normal up, and their middle at the origin."""
+def _levelled(points: np.ndarray, com: np.ndarray) -> np.ndarray:
+    """The points with their best plane at z = 0, the CoM above it, their middle at the origin."""
     centred = points - points.mean(axis=0)
     normal = np.linalg.svd(centred)[2][2]
-    if normal[2] < 0:
+    if normal @ (com - points.mean(axis=0)) < 0:
         normal = -normal
     turn = pin.Quaternion.FromTwoVectors(normal, np.array([0.0, 0.0, 1.0])).matrix()
     return np.asarray(centred @ turn.T)
