@@ -43,7 +43,7 @@ class BagFile(LogFile):
         """Read the index, and of each topic its first messages."""
         super().__init__(path)
         require("rosbags", "reading a bag")
-        self.layout = "ROS"
+        self.layout: str = "ROS"
         passed = set()
         with self._opened() as reader:
             for topic in {c.topic: c for c in reader.connections}.values():

@@ -38,7 +38,7 @@ class C3dFile(LogFile):
                 f"{path} has no force plate that can be read. Its parameters need FORCE_PLATFORM "
                 "with CORNERS, ORIGIN and CHANNEL."
             )
-        self.layout = "force plates"
+        self.layout: str = "force plates"
         self.add(Channel("time", 1, meaning="time"))
         for name in held:
             self.add(Channel(name, 6, (), "time", "wrench", "world"))

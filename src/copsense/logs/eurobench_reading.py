@@ -31,7 +31,7 @@ class EurobenchFolder(LogFile):
     def __init__(self, path: Path) -> None:
         """Read the headings."""
         super().__init__(path)
-        self.layout = "Eurobench"
+        self.layout: str = "Eurobench"
         self._files: dict[str, CsvFile] = {}
         self._columns: dict[str, tuple[str, ...]] = {}
         for name in (*_JOINTS, *_FEET):
@@ -86,4 +86,4 @@ class EurobenchFolder(LogFile):
             columns = [c for key in own for c in self._columns[key]]
             for block in table.blocks(columns, advance) if own else ():
                 yield {key: np.hstack([block[c] for c in self._columns[key]]) for key in own}
-        self.notes += [note for table in self._files.values() for note in table.notes]
+        self.notes.extend([note for table in self._files.values() for note in table.notes])

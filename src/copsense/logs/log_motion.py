@@ -125,11 +125,11 @@ def stand_on_feet(
         poses = [data.oMi[joint] * place for joint, place in places]
         points[i] = [pose.translation for pose in poses]
         if surface is not None:
-            _put(q[i], poses[surface].inverse())
+            _move(q[i], poses[surface].inverse())
     if surface is None:
         target = _levelled(_average(points), np.array(pin.centerOfMass(model, data, q[0])))
         for i in range(len(q)):
-            _put(q[i], _fit(points[i], target))
+            _move(q[i], _fit(points[i], target))
     return q
 
 
@@ -224,6 +224,12 @@ def smooth_motion(
 def _put(q: np.ndarray, pose: pin.SE3) -> None:
     q[:3] = pose.translation
     q[3:7] = pin.Quaternion(pose.rotation).normalized().coeffs()
+
+
+def _move(q: np.ndarray, move: pin.SE3) -> None:
+    """Move the whole robot."""
+    turn = pin.Quaternion(np.array(q[3:7])).normalized()
+    _put(q, move * pin.SE3(turn.matrix(), np.array(q[:3])))
 
 
 def _average(points: np.ndarray) -> np.ndarray:

@@ -42,19 +42,21 @@ class MatlabFile(LogFile):
         leaves, notes, close = read_tree(path)
         # A v5 file is in memory now; of v7.3 only what is asked for will be.
         self._whole = leaves if close is None else None
-        self.notes += notes
+        self.notes.extend(notes)
         self.texts: dict[str, tuple[str, ...]] = {x.key: x.texts for x in leaves if x.texts}
         self._read: dict[str, tuple[Leaf, int]] = {}
         numbers = [leaf for leaf in leaves if leaf.read is not None]
         groups = {leaf.group for leaf in numbers}
+        layout = ""
         for group in sorted(groups):
             own = {leaf.field: leaf for leaf in numbers if leaf.group == group}
             if {"data", "timestamps"} <= own.keys():
-                self.layout = "robometry"
+                layout = "robometry"
                 self._add_telemetry(group, own)
             elif "values" in own and group.rpartition(".")[2].startswith("signals"):
-                self.layout = "Simulink structure"
+                layout = "Simulink structure"
                 self._add_simulink(group, own["values"], numbers)
+        self.layout: str = layout
         self._add_flat([leaf for leaf in numbers if leaf.key not in self._read])
         if close is not None:
             close()

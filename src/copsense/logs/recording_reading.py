@@ -55,9 +55,9 @@ class RecordingFile(LogFile):
             if data["configuration"].shape[1] >= 7 + data["joint_position"].shape[1]:
                 self.add(Channel("configuration/position", 3, (), "time", "base position"))
                 self.add(Channel("configuration/rotation", 4, (), "time", "base rotation"))
-            self.rows = int(data.sizes["time"])
+            self.rows: int = int(data.sizes["time"])
             self.robot: str = str(data.attrs.get("robot", ""))
-        self.layout = "copsense recording"
+        self.layout: str = "copsense recording"
 
     def blocks(
         self, keys: Sequence[str], advance: Progress
