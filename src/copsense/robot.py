@@ -392,7 +392,7 @@ class Robot:
         """Name of the link that is the base; of its joint where no link is named."""
         on_base = [frame for frame in self.model.frames if frame.parentJoint == 1]
         bodies = [frame for frame in on_base if frame.type == pin.FrameType.BODY]
-        return str((bodies or on_base)[0].name)
+        return str((bodies or on_base)[0].name) if on_base else str(self.model.names[1])
 
     @cached_property
     def position_limits(self) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:

@@ -17,6 +17,7 @@ from copsense.controllers import BalancingController, Command, Observation, Path
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
+from copsense.stance import Stance
 from copsense.statics import solve_equilibrium
 from copsense.timed_path import Sway
 
@@ -45,7 +46,7 @@ class SwayController:
             raise InvalidInputError(
                 f"{signal!r} is not a sway. Give a reference whose signal is a Sine."
             )
-        self.stance = reference.path.at(0.0)[0]
+        self.stance: Stance = reference.path.at(0.0)[0]
         self.name: str = f"{criterion.name} in motion"
         self._signal = signal
         self._feedback = BalancingController(self.stance, criterion)
