@@ -117,6 +117,37 @@ class Kkt:
             df = df + self.tie.move_derivative(at, V, AV, df)
         return df, AV[self.nb :] - self.problem.joint_map.dot(df)
 
+    def weight_derivative(
+        self,
+        forces: Float[np.ndarray, " m"],
+        multipliers: Float[np.ndarray, " nv"],
+        change: Quadratic,
+    ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " n"]]:
+        """How forces and torques change as the weights do, at a held posture and load.
+
+        The same matrix with right-hand side [-dP nu; dW_f f - d(W_f f_ref)], dP = -P dW_tau P.
+
+        Args:
+            forces: of `share` (m,).
+            multipliers: of `share` (nv,).
+            change: dW_tau, dW_f and d(W_f f_ref); the joints that cost anything stay the same.
+
+        Raises:
+            InvalidInputError: the weights leave forces undetermined, or follow the inertia.
+        """
+        if self.tie is not None or self.quadratic.inertia or change.inertia:
+            raise InvalidInputError(
+                "derivatives by weights are of criteria that determine the wrenches by themselves, "
+                "with constant weights."
+            )
+        nu = self.stance.robot.in_drives(multipliers)[self.nb :][self.quadratic.active]
+        P, on = self.quadratic.compliance(self.problem), self.quadratic.active
+        right = np.zeros(self.size + len(forces))
+        right[self.nb : self.size] = P @ (change.torque[np.ix_(on, on)] @ (P @ nu))
+        right[self.size :] = change.wrench @ forces - change.pull
+        df = self.system.solve(right)[self.size :]
+        return df, -self.problem.joint_map.dot(df)
+
 
 class TieBreak:
     """A second criterion that decides the forces F z which the first leaves free.

@@ -1,0 +1,15 @@
+"""Identification: which criterion explains the forces or torques that a robot measured."""
+
+from copsense.identification.fitting import fit_family
+from copsense.identification.identifying import Identification, identify
+from copsense.identification.measurements import Measurements
+from copsense.identification.parameter_fit import Estimate, ParameterFit
+
+__all__ = [
+    "Estimate",
+    "Identification",
+    "Measurements",
+    "ParameterFit",
+    "fit_family",
+    "identify",
+]
