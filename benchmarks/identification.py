@@ -29,9 +29,9 @@ TEXT = """# Identification
 
 Written by `benchmarks/identification.py`. In {runs} seeded runs for each family the iCub sways its
 centre of mass by 28 mm at 0.2 Hz for {LENGTH:g} s; the left foot's load share, of a criterion with
-known parameters and with inertia, is measured {RATE:g} times a second with noise of {noise:g} of the
-weight that remembers for {MEMORY:g} s, and an offset of {OFFSET:g}. *Covered*: how often the stated
-95 % interval held the truth. The share of one foot does not see the knees' weight.
+known parameters and with inertia, is measured {RATE:g} times a second with noise of {noise:g} of
+the weight that remembers for {MEMORY:g} s, and an offset of {OFFSET:g}. *Covered*: how often the
+stated 95 % interval held the truth. The share of one foot does not see the knees' weight.
 
 | family | parameter | truth | mean estimate | covered |
 | --- | --- | --- | --- | --- |

@@ -16,10 +16,12 @@ from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
 from copsense.labelled import LabelledResult
+from copsense.identification import Measurements, identify
 from copsense.limits import limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.loads import SpringLoad
 from copsense.logs import JointsMap, Log, LogMap, WrenchMap, WrenchSeries, compare_log
+from copsense.logs.comparing import align_log
 from copsense.maps import MapPlan
 from copsense.maps.map_statistics import CriterionSummary as Summary
 from copsense.maps.map_statistics import FailedPosture, MapSummary, WorstPosture
@@ -68,6 +70,13 @@ def small_log(icub) -> Log:
         for name, f in zip(icub.contact_names, forces, strict=True)
     )
     return Log("made up", times, names, positions, sensors, torques=0 * positions)
+
+
+def swaying(icub) -> Measurements:
+    """Load shares of a sway at rest."""
+    stances = copsense.lateral_sweep(icub, -0.02, 0.02, 20).stances
+    found = [copsense.solve_equilibrium(stance, TORQUE).wrenches for stance in stances]
+    return Measurements.of(stances, np.array(found))
 
 
 def all_results(icub) -> dict[str, object]:
@@ -140,6 +149,9 @@ def all_results(icub) -> dict[str, object]:
         "controller": BalancingController(icub, TORQUE),
         "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),
         "log": small_log(icub),
+        "aligned log": align_log(small_log(icub), icub),
+        "measurements": swaying(icub),
+        "identification": identify(swaying(icub), ["length"]),
         "comparison of a log": compare_log(small_log(icub), icub, [TORQUE], skip=0.0),
         "mapping of a log": LogMap(
             JointsMap({"l_knee": "k"}, rename={"k": "l_knee"}),

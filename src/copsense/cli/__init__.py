@@ -30,6 +30,7 @@ _COMMANDS = {
         ("design", "design", "Design the weights of a criterion that goes farther."),
         ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
         ("log", "log", "Compare a robot's own log with what every criterion says."),
+        ("identify", "identify", "Identify which criterion explains a robot's own log."),
         ("benchmark", "benchmark", "Compare balancing controllers in simulation."),
         ("four-bar", "four_bar", "Solve the paper's four-bar linkage in closed form."),
         ("reproduce", "reproduce", "Reproduce the paper and write a report."),

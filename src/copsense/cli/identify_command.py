@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
 from copsense.cli.printing import echo_json, echo_notes, progress_bar
@@ -84,17 +86,18 @@ def identify(
     copsense.identification.identify_log.
     """
     from copsense.identification import identify_log
+    from copsense.logs import read_log
     from copsense.logs.comparing import log_robot
-    from copsense.logs.log_reading import read_log
 
     after = read_quantity(skip, "s")
     on, known = log_robot(robot, package_dirs)
     named = {contact.name: contact for contact in known}
     feet = [named.get(name, name) for name in contacts] or list(known)
-    with progress_bar(None, "reading") as advance:
-        log = read_log(
-            file, map_file, wanted=on, contacts=list(contacts) or list(named), advance=advance
-        )
+    path = Path(file)
+    size = path.stat().st_size if path.is_file() else None
+    wanted = list(contacts) or list(named)
+    with progress_bar(size, f"reading {path.name}", "B") as advance:
+        log = read_log(file, map_file, robot=on, contacts=wanted, advance=advance)
     with progress_bar(None, "identifying", "row") as advance:
         found = identify_log(
             log,

@@ -2,6 +2,7 @@
 
 from copsense.identification.fitting import fit_family
 from copsense.identification.identifying import Identification, identify
+from copsense.identification.log_identification import identify_log
 from copsense.identification.measurements import Measurements
 from copsense.identification.parameter_fit import Estimate, ParameterFit
 
@@ -12,4 +13,5 @@ __all__ = [
     "ParameterFit",
     "fit_family",
     "identify",
+    "identify_log",
 ]

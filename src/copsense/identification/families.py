@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from jaxtyping import Float
 
 from copsense.criterion import Criterion
 from copsense.design import Family, families, joint_groups
@@ -47,18 +48,20 @@ def identifiable_named(stance: Stance, name: str) -> Family:
     return known[name]
 
 
+def built(family: Family, logarithms: Sequence[float] | Float[np.ndarray, " p"]) -> Criterion:
+    """The criterion of a family at logarithms of its parameters."""
+    return family.build(np.exp(np.asarray(logarithms)).tolist())
+
+
 def weight_changes(
     family: Family, logarithms: Sequence[float], stance: Stance
 ) -> tuple[Quadratic, ...]:
     """Derivatives of a family's weights by the logarithm of each parameter."""
     found = []
     for i in range(len(logarithms)):
-        high, low = (
-            family.build(np.exp(np.array(logarithms) + s * _STEP * np.eye(len(logarithms))[i])).at(
-                stance
-            )
-            for s in (1, -1)
-        )
+        moved = _STEP * np.eye(len(logarithms))[i]
+        moved = _STEP * np.eye(len(logarithms))[i]
+        high, low = (built(family, np.array(logarithms) + s * moved).at(stance) for s in (1, -1))
         parts = (
             (getattr(high, name) - getattr(low, name)) / (2 * _STEP)
             for name in ("torque", "inertia", "wrench", "pull")

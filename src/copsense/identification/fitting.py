@@ -17,14 +17,14 @@ from jaxtyping import Float
 from copsense.criterion import Criterion
 from copsense.design import Family
 from copsense.errors import CopsenseError
-from copsense.identification.families import weight_changes
+from copsense.identification.families import built, weight_changes
 from copsense.identification.measurements import Measurements
 from copsense.identification.parameter_fit import Estimate, ParameterFit
 from copsense.logs.sway_fit import inflation
 from copsense.statics.kkt import Kkt
 
 _STEPS = 12
-_SETTLED = 1e-5  # of a logarithm
+_SETTLED = 1e-2  # standard deviations by which a step moves the parameters
 _LONGEST = 1.5  # of a step, of a logarithm
 _UNKNOWN = math.log(10.0)  # half-width of an interval, of a logarithm, from which nothing is seen
 _HALVINGS = 6
@@ -91,7 +91,7 @@ def fit_family(
         else:  # nothing better near: rounding is all that is left
             converged = True
             break
-        moved = float(np.abs(tried - u).max(initial=0.0))
+        moved = float(np.linalg.norm(X.reshape(-1, len(u)) @ (tried - u)))
         u, values, slopes = tried, values_there, slopes_there
         weights, effective = _weights(measurements.values - values)
         if moved < _SETTLED:
@@ -110,7 +110,7 @@ def _look(family: Family, measurements: Measurements, usual: np.ndarray) -> np.n
     spread = few.values.std(axis=0)
 
     def unexplained(u: np.ndarray) -> float:
-        values, _ = predict(family.build(np.exp(u)), few)
+        values, _ = predict(built(family, u), few)
         return float(((_centred(few.values - values) / spread) ** 2).sum())
 
     best, least = usual, unexplained(usual)
@@ -127,7 +127,7 @@ def evaluate(
 ) -> tuple[Float[np.ndarray, "N c"], Float[np.ndarray, "N c p"]]:
     """Predicted channels at logarithms of a family's parameters, and their derivatives by them."""
     first = measurements.stances[0]
-    criterion = family.build(np.exp(u))
+    criterion = built(family, u)
     return predict(criterion, measurements, weight_changes(family, u.tolist(), first), progress)
 
 
@@ -252,7 +252,7 @@ def _result(
             estimates[name] = Estimate(value, math.nan, math.nan, "not identified")
         else:
             estimates[name] = Estimate(value, *ends)
-    criterion = family.build(np.exp(u))
+    criterion = built(family, u)
     return ParameterFit(
         family.name,
         criterion,

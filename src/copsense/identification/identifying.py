@@ -120,11 +120,10 @@ def identify(
     for family in wanted:
         fit = fit_family(family, measurements, progress=progress)
         fits[family.name] = fit
-        start = np.clip(
-            [np.nan_to_num(e.value, nan=bound[0]) for e, bound in
-             zip(fit.estimates.values(), family.bounds, strict=True)],
-            *np.array(family.bounds).T,
-        )  # fmt: skip
+        start = [
+            min(max(low if np.isnan(e.value) else e.value, low), high)
+            for e, (low, high) in zip(fit.estimates.values(), family.bounds, strict=True)
+        ]
         found[family.name] = cross_validated(
             lambda rows, family=family, start=start: (
                 fit_family(  # type: ignore[misc]

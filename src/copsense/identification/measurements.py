@@ -47,7 +47,8 @@ class Measurements(ShortRepr):
         """The channels that were measured throughout.
 
         Where only normal forces were measured these are load shares, of every contact but the
-        last: a common scale of the sensors says nothing. Of whole wrenches it is every component.
+        last: a common scale of the sensors says nothing, but an offset of one changes the scale of
+        the shares by its part of the weight. Of whole wrenches it is every component.
 
         Args:
             stances: the posture of each row, at least 20.

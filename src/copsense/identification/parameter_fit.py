@@ -80,9 +80,11 @@ class ParameterFit(ShortRepr):
         """The combinations of parameters that are not seen, in words."""
         found = []
         for i in self.unseen:
+            powers = self.directions[i]
+            powers = powers * np.sign(powers[int(np.argmax(np.abs(powers)))])
             parts = [
                 f"{name}^{power:+.2f}"
-                for name, power in zip(self.estimates, self.directions[i], strict=True)
+                for name, power in zip(self.estimates, powers, strict=True)
                 if abs(power) > 0.05
             ]
             found.append(" ".join(parts))

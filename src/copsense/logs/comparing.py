@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Literal
@@ -14,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 
 from copsense.arrays import check_type, finite_number, whole_number
 from copsense.contact import Contact
+from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.logs.finding import Finding
@@ -88,34 +90,14 @@ def compare_log(
     postures = whole_number(postures, "the number of postures of a log", least=_LEAST)
     chosen = (minimum_torque(), minimum_wrench(1.0)) if criteria is None else tuple(criteria)
     named_criteria(chosen, "the comparison of a log", policies=False)
-    model, known_contacts = log_robot(robot)
-    feet = _contacts(log, model, known_contacts, contacts)
-    findings = [*log.findings, *check_joints(log, model)]
-    whole, model = model, model.keeping(log.joint_names)
-    notes = [*log.notes, *_locked(whole, model, feet)]
-    findings += check_encoders(log, model, feet)
-    known = np.isfinite(log.positions).all(axis=1)
-    if base == "recorded":
-        if log.base is None:
-            raise InvalidInputError(
-                f"{log.source} has no base pose. Leave the base to the feet (base='feet')."
-            )
-        stand = partial(_recorded, model, log.base, log.base_frame)
-        known &= np.isfinite(log.base).all(axis=1)
-    elif base == "feet":
-        stand = partial(_on_feet, model, feet)
-    else:
-        raise InvalidInputError(f"the base is {base!r}. Give 'feet' or 'recorded'.")
-    motion, window = _motion(log, model, stand, known)
-    wrenches = ground_wrenches(log, model, feet, motion, base == "recorded")
-    findings += audit_forces(log, model, feet, wrenches[:, :, 2])
-    findings += audit_feet(log, model, feet, motion)
-    rows = _compared(log, model, feet, motion, wrenches, postures, notes)
+    aligned = align_log(log, robot, contacts=contacts, base=base, postures=postures)
+    model, feet, motion, rows = aligned.robot, aligned.contacts, aligned.motion, aligned.rows
+    findings, notes, wrenches = [*aligned.findings], [*aligned.notes], aligned.wrenches
     statics = log_statics(model, feet, chosen, motion, rows, advance)
     com = _com(model, motion.configurations[rows])
     placed = Stance(model, motion.configurations[rows[len(rows) // 2]], tuple(feet), check=False)
     travel, distance = _travel(placed, com)
-    measured, times = wrenches[rows], log.times[rows]
+    measured, times, window = wrenches[rows], log.times[rows], motion.window
     sway, slopes = _slopes(times, travel, distance, measured, statics, feet, skip, notes)
     findings += _audit_slopes(feet, slopes)
     findings += audit_com(com[:, :2], _total_cop(placed, measured))
@@ -136,13 +118,86 @@ def compare_log(
         travel,
         distance,
         measured,
-        _torques(log, model, rows),
+        aligned.torques,
         statics,
         sway,
         slopes,
         skip,
         tuple(findings),
         tuple(notes),
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AlignedLog(ShortRepr):
+    """A log with its robot on its feet, and the rows on which everything needed was measured.
+
+    Attributes:
+        robot: without the joints that the log lacks.
+        contacts: in order.
+        motion: of every row of the log (N).
+        rows: those that are used (M,).
+        wrenches: of the ground on each contact at every row (N, nc, 6); NaN where not measured.
+        torques: of the motors at the rows that are used (M, n) [Nm]; None where there are none.
+        findings: what is missing or does not fit.
+        notes: how it was done.
+    """
+
+    robot: Robot
+    contacts: tuple[Contact, ...]
+    motion: LogMotion
+    rows: Int[np.ndarray, " M"]
+    wrenches: Float[np.ndarray, "N nc 6"]
+    torques: Float[np.ndarray, "M n"] | None
+    findings: tuple[Finding, ...]
+    notes: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        freeze(self, "rows", "wrenches", "torques")
+
+
+def align_log(
+    log: Log,
+    robot: str | Path | Robot | Stance,
+    *,
+    contacts: Sequence[str | Contact] | None = None,
+    base: Literal["feet", "recorded"] = "feet",
+    postures: int = POSTURES,
+) -> AlignedLog:
+    """Put a log's robot on its feet, and find the rows to use; as `compare_log` does.
+
+    Raises:
+        UnknownNameError: the robot lacks a joint, or the frame of a sensor.
+        InvalidInputError: positions in degrees, a foot without a sensor, no row on which all feet
+            are loaded, or no base recorded.
+    """
+    model, known_contacts = log_robot(robot)
+    feet = _contacts(log, model, known_contacts, contacts)
+    findings = [*log.findings, *check_joints(log, model)]
+    whole, model = model, model.keeping(log.joint_names)
+    notes = [*log.notes, *_locked(whole, model, feet)]
+    findings += check_encoders(log, model, feet)
+    known = np.isfinite(log.positions).all(axis=1)
+    if base == "recorded":
+        if log.base is None:
+            raise InvalidInputError(
+                f"{log.source} has no base pose. Leave the base to the feet (base='feet')."
+            )
+        stand = partial(_recorded, model, log.base, log.base_frame)
+        known &= np.isfinite(log.base).all(axis=1)
+    elif base == "feet":
+        stand = partial(_on_feet, model, feet)
+    else:
+        raise InvalidInputError(f"the base is {base!r}. Give 'feet' or 'recorded'.")
+    motion, _ = _motion(log, model, stand, known)
+    wrenches = ground_wrenches(log, model, feet, motion, base == "recorded")
+    findings += audit_forces(log, model, feet, wrenches[:, :, 2])
+    findings += audit_feet(log, model, feet, motion)
+    rows = _compared(log, model, feet, motion, wrenches, postures, notes)
+    torques = _torques(log, model, rows)
+    return AlignedLog(
+        model, tuple(feet), motion, rows, wrenches, torques, tuple(findings), tuple(notes)
     )
 
 
