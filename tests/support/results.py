@@ -15,8 +15,8 @@ from copsense.controllers import BalancingController
 from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
-from copsense.labelled import LabelledResult
 from copsense.identification import Measurements, identify
+from copsense.labelled import LabelledResult
 from copsense.limits import limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.loads import SpringLoad

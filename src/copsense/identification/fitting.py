@@ -31,6 +31,7 @@ _HALVINGS = 6
 _AT_BOUND = 1e-3  # of a logarithm
 _BLOCKS = 5
 _TINY = 1e-12
+_EXACT = 1e-3  # of its own spread: no channel is believed better than that
 _FEW = 40  # rows that a coarse grid is looked at by
 _GRID, _COARSE = 9, 5  # its points for one parameter, and for each of several
 
@@ -59,13 +60,13 @@ def fit_family(
     low, high = np.log(np.array(family.bounds, dtype=float)).T
     u = np.clip(np.zeros(len(low)) if start is None else np.log(start), low, high)
     values, slopes = evaluate(family, u, measurements, progress)
-    weights, effective = _weights(measurements.values - values)
+    weights, effective = _weights(measurements.values - values, measurements.values.std(axis=0))
     X = _centred(slopes) * weights[:, None]
     if start is None and not _solve(X, _centred(values) * weights, effective)[1].any():
         # Nothing is seen from here, as of a length that is far too long.
         u = _look(family, measurements, u)
         values, slopes = evaluate(family, u, measurements, progress)
-        weights, effective = _weights(measurements.values - values)
+        weights, effective = _weights(measurements.values - values, measurements.values.std(axis=0))
     converged, steps = False, 0
     for number in range(1, _STEPS + 1):
         steps = number
@@ -93,7 +94,7 @@ def fit_family(
             break
         moved = float(np.linalg.norm(X.reshape(-1, len(u)) @ (tried - u)))
         u, values, slopes = tried, values_there, slopes_there
-        weights, effective = _weights(measurements.values - values)
+        weights, effective = _weights(measurements.values - values, measurements.values.std(axis=0))
         if moved < _SETTLED:
             converged = True
             break
@@ -191,12 +192,14 @@ def cross_validated(
     return float(np.sqrt(np.mean((errors / spread) ** 2))), errors
 
 
-def _weights(rest: np.ndarray) -> tuple[Float[np.ndarray, " c"], float]:
+def _weights(
+    rest: Float[np.ndarray, "N c"], spread: Float[np.ndarray, " c"]
+) -> tuple[Float[np.ndarray, " c"], float]:
     """1 / (size sqrt(n/n_eff)) of each channel's rest, and the rows' independent number."""
     centred = _centred(rest)
     worth = np.array([len(rest) / inflation(column) for column in centred.T])
     size = np.sqrt((centred**2).sum(axis=0) / len(rest))
-    size = np.maximum(size, _TINY + 1e-9 * size.max(initial=0.0))
+    size = np.maximum(size, _EXACT * spread + _TINY)
     # sigma^2 of the effective degrees of freedom, an offset taken off.
     size = size * np.sqrt(worth / np.maximum(1.0, worth - 1.0))
     return np.sqrt(worth / len(rest)) / size, float(worth.sum())
@@ -229,7 +232,7 @@ def _result(
     converged: bool,
 ) -> ParameterFit:
     rest = measurements.values - values
-    weights, effective = _weights(rest)
+    weights, effective = _weights(rest, measurements.values.std(axis=0))
     X = _centred(slopes) * weights[:, None]
     flat = X.reshape(-1, X.shape[2])
     _, s, vt = np.linalg.svd(flat, full_matrices=True)
