@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.arrays import owned
 from copsense.content import ShortRepr, freeze
 from copsense.criterion import minimum_torque, minimum_wrench
 from copsense.design import Family
@@ -45,7 +46,9 @@ class Identification(ShortRepr):
     channel_errors: Mapping[str, Float[np.ndarray, " c"]]
 
     def __post_init__(self) -> None:
-        """Own the mappings."""
+        """Own the mappings and the arrays in them."""
+        owned_errors = {name: owned(errors) for name, errors in self.channel_errors.items()}
+        object.__setattr__(self, "channel_errors", owned_errors)
         freeze(self, "fits", "errors", "channel_errors")
 
     @property
