@@ -36,6 +36,7 @@ from copsense.simulation import ModelError, Scenario
 from copsense.simulation.prediction import predict
 from copsense.sole import read_sole
 from copsense.sway_levers import sway_levers
+from copsense.terms import PreloadTerm
 from copsense.timed_path import Sway, TimedPath
 from support.driven_robots import everything, standing
 
@@ -150,6 +151,7 @@ def all_results(icub) -> dict[str, object]:
         "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),
         "log": small_log(icub),
         "aligned log": align_log(small_log(icub), icub),
+        "preload": PreloadTerm(np.zeros((2, 6))),
         "measurements": swaying(icub),
         "identification": identify(swaying(icub), ["length"]),
         "comparison of a log": compare_log(small_log(icub), icub, [TORQUE], skip=0.0),
