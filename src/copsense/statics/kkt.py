@@ -208,12 +208,12 @@ class TieBreak:
 def _undetermined(
     stance: Stance, criterion: Criterion, free: np.ndarray
 ) -> tuple[str, tuple[str, ...]]:
-    share = np.linalg.norm(free, axis=1)
+    share = np.linalg.norm(free[: len(stance.row_names)], axis=1)  # those of loops follow
     rows = tuple(n for n, s in zip(stance.row_names, share, strict=True) if s > 1e-6)
     return (
         f"criterion {criterion.name!r} leaves {free.shape[1]} direction(s) of the wrenches "
         f"undetermined at this stance, in {', '.join(rows)} (contact Jacobian: rank {stance.rank} "
-        f"of {len(stance.component_index)} rows). Give it a tie_break such as minimum_wrench(1.0), "
+        f"of {len(stance.constraints)} rows). Give it a tie_break such as minimum_wrench(1.0), "
         "or bend a straight leg.",
         rows,
     )
