@@ -24,6 +24,7 @@ from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt, complete_contacts
 from copsense.robots.plausibility import check_plausible, check_size
 from copsense.robots.presets import PRESETS, preset_robot
+from copsense.robots.rigid_points import keep_distances
 from copsense.robots.uprighting import base_turn, upright_contacts
 from copsense.shapes import Geometry
 from copsense.stance import Stance, check_support
@@ -46,7 +47,7 @@ def load_robot(
     drives: Drives | None = None,
     passive: Iterable[str] = (),
 ) -> Robot:
-    """A robot from a preset's name, a URDF or MJCF (path or text), or a ``pin.Model``.
+    """A robot from a preset's name, a URDF, MJCF or SDF (path or text), or a ``pin.Model``.
 
     Args:
         source: what to load; a `Robot` is returned as it is.
@@ -87,7 +88,9 @@ def _read(
     if not (text.lstrip().startswith("<") or is_file(path) or path.suffix) and (
         path.parent == Path()
     ):
-        raise UnknownNameError("robot", text, PRESETS, "Or give the path of a URDF or MJCF file.")
+        raise UnknownNameError(
+            "robot", text, PRESETS, "Or give the path of a URDF, MJCF or SDF file."
+        )
     return Robot.from_description(
         load_description(source, None, package_dirs, frames=frames, root=root)
     )
@@ -114,8 +117,8 @@ def load_stance(
     Joints not named start at zero, or inside their range where that leaves zero out.
 
     Args:
-        source: preset's name, URDF or MJCF, `Robot` or ``pin.Model``; or a stance file (.toml),
-            which says all the rest itself.
+        source: preset's name, URDF, MJCF or SDF, `Robot` or ``pin.Model``; or a stance file
+            (.toml), which says all the rest itself.
         contacts: frames (taken as surface contacts) or `Contact` values; default the preset's.
         posture: joint name -> position [rad, or m] that the stance stays nearest to; it replaces
             the preset's joint by joint.
@@ -250,6 +253,7 @@ def stand(
         normal = np.array(_plane(contact).normal)
         along = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) > _UP else normal
         targets.append(pin.SE3(flat @ place.rotation, origin - _height(contact, origin) * along))
+    targets = keep_distances(robot, contacts, loose.placements, targets)
     centre = np.mean([targets[k].translation for k in ground], axis=0)
     com = (None if planar else float(centre[0]), float(centre[1]), None)
     return check_plausible(_settled(loose, targets, com))
