@@ -47,7 +47,9 @@ def test_a_file_that_is_no_xml_says_so(load, content, tmp_path):
 def test_xml_of_another_kind_is_rejected_with_the_kinds_there_are():
     with pytest.raises(ModelLoadError, match=r"starts with <html>, URDF with <robot>"):
         Robot.from_urdf("<html/>")
-    with pytest.raises(ModelLoadError, match=r"URDF with <robot> and MJCF with <mujoco>"):
+    with pytest.raises(
+        ModelLoadError, match=r"URDF with <robot>, MJCF with <mujoco> and SDF with <sdf>"
+    ):
         copsense.load_robot("<html/>")
 
 
@@ -174,7 +176,9 @@ def test_a_robot_without_geometry_says_so():
 
 
 def test_an_unknown_robot_lists_the_known_ones_and_the_nearest():
-    with pytest.raises(UnknownNameError, match=r"'iccub'.*Did you mean icub.*talos.*URDF or MJCF"):
+    with pytest.raises(
+        UnknownNameError, match=r"'iccub'.*Did you mean icub.*talos.*URDF, MJCF or SDF"
+    ):
         copsense.load_robot("iccub")
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from copsense.errors import ModelLoadError
+from copsense.sdf import sdf_faults, sdf_notes
 from copsense.urdf import urdf_faults, urdf_notes, without_namespace, xacro_left
 from copsense.written_base import take_out_base
 from copsense.xml_numbers import wrong_number
 
-Language = Literal["urdf", "mjcf"]
+Language = Literal["urdf", "mjcf", "sdf"]
 
 _DRAKE = 'xmlns:drake="http://drake.mit.edu"'
-_ROOTS: dict[Language, str] = {"urdf": "robot", "mjcf": "mujoco"}
+_ROOTS: dict[Language, str] = {"urdf": "robot", "mjcf": "mujoco", "sdf": "sdf"}
 # Attributes of an MJCF's bodies, inertials and joints that hold numbers; the parser reads a word as
 # whatever comes next in memory or as zero.
 _MJCF_NUMBERS = {"pos": 3, "quat": 4, "axis": 3, "mass": 1, "diaginertia": 3, "fullinertia": 6}
@@ -29,7 +30,7 @@ class Description:
 
     Attributes:
         text: the XML.
-        language: ``"urdf"`` or ``"mjcf"``.
+        language: ``"urdf"``, ``"mjcf"`` or ``"sdf"``.
         package_dirs: folders in which ``package://`` meshes are looked up.
         path: the file the text came from, if any.
         notes: what the text says and is not used, a sentence each; `Robot.notes` holds them.
@@ -81,9 +82,10 @@ def load_description(
         root: as of `Description`.
 
     Raises:
-        ModelLoadError: the file is missing, or is not a valid URDF or MJCF; the message says why.
+        ModelLoadError: the file is missing, or is not a valid URDF, MJCF or SDF; the message
+            says why.
     """
-    kind = language.upper() if language else "URDF or MJCF"
+    kind = language.upper() if language else "URDF, MJCF or SDF"
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     if not isinstance(source, str | Path):
         raise ModelLoadError(
@@ -99,15 +101,16 @@ def load_description(
     spaced = without_namespace(document)
     found = next((known for known, tag in _ROOTS.items() if tag == document.tag), None)
     if found is None or found != (language or found):
-        starts = " and ".join(
+        starts = [
             f"{known.upper()} with <{_ROOTS[known]}>"
             for known in ([language] if language else _ROOTS)
-        )
+        ]
+        wanted = " and ".join(filter(None, (", ".join(starts[:-1]), starts[-1])))
         hint = f"Use load_robot or Robot.from_{found} for this one." if found else "Give such one."
-        raise ModelLoadError(f"{name} starts with <{document.tag}>, {starts}. {hint}")
+        raise ModelLoadError(f"{name} starts with <{document.tag}>, {wanted}. {hint}")
     if xacro := xacro_left(document) if found == "urdf" else ():
         raise _unexpanded(name, xacro)
-    faults = list(urdf_faults(document) if found == "urdf" else _mjcf_faults(document))
+    faults = list(_FAULTS[found](document))
     if faults:
         more = f" (and {len(faults) - 5} more)" if len(faults) > 5 else ""
         raise ModelLoadError(
@@ -117,6 +120,8 @@ def load_description(
     notes: tuple[str, ...] = ()
     if found == "urdf":
         notes = (*take_out_base(document), *urdf_notes(document))
+    elif found == "sdf":
+        notes = tuple(sdf_notes(document))
     if spaced or notes:
         text = ET.tostring(document, encoding="unicode")
     return Description(text, found, tuple(map(str, package_dirs)), path, notes, tuple(frames), root)
@@ -185,3 +190,10 @@ def _mjcf_faults(root: ET.Element) -> Iterator[str]:
             inside = where if element is body else f"{element.tag} of {where}"
             for attribute, count in _MJCF_NUMBERS.items():
                 yield from wrong_number(element, attribute, count, inside)
+
+
+_FAULTS: dict[Language, Callable[[ET.Element], Iterator[str]]] = {
+    "urdf": urdf_faults,
+    "mjcf": _mjcf_faults,
+    "sdf": sdf_faults,
+}

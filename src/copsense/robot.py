@@ -1,4 +1,4 @@
-"""Robot: a floating-base rigid-body model, from URDF, MJCF or a ready ``pin.Model``."""
+"""Robot: a floating-base rigid-body model, from URDF, MJCF, SDF or a ready ``pin.Model``."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ from copsense.drives import Actuation, Drives
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
+from copsense.sdf_model import read_sdf
 from copsense.urdf_drives import read_urdf_drives
 
 # Root joints that let the whole robot move: the base rows of the statics are theirs.
@@ -104,7 +105,7 @@ class Robot:
                 f"the joints of robot {self.name!r} are not in depth-first order: those carried by "
                 f"{', '.join(stray)} do not follow directly. Pinocchio's derivatives would be "
                 "wrong. Add the joints of each limb to its tip before those "
-                "of the next limb, or load the robot from its URDF or MJCF."
+                "of the next limb, or load the robot from its URDF, MJCF or SDF."
             )
         bent = [
             name
@@ -207,6 +208,19 @@ class Robot:
         return cls.from_description(description, name=name)
 
     @classmethod
+    def from_sdf(cls, source: str | Path, *, name: str | None = None) -> Robot:
+        """Read an SDF file or its text; a base that is fixed floats, rods close loops.
+
+        Args:
+            source: path of the file, or the XML itself.
+            name: the robot's name; default the one in the file.
+
+        Raises:
+            ModelLoadError: the file is missing or not an SDF, or holds what is not read.
+        """
+        return cls.from_description(load_description(source, "sdf"), name=name)
+
+    @classmethod
     def from_model(
         cls, model: pin.Model, *, name: str | None = None, drives: Drives | None = None
     ) -> Robot:
@@ -276,6 +290,10 @@ class Robot:
             found = read_urdf_drives(description.text, _build_urdf(description))
             notes, model = (*description.notes, *found.notes), found.model
             return cls(name or model.name or "robot", model, description, notes, found.drives)
+        if description.language == "sdf":
+            sdf = read_sdf(description.text)
+            notes = (*description.notes, *sdf.notes)
+            return cls(name or sdf.model.name, sdf.model, description, notes, sdf.drives)
         read = read_mjcf(description)
         notes = (*description.notes, *read.notes)
         title = name or read.model.name or "robot"

@@ -26,6 +26,7 @@ def whole_robot(robot: Robot) -> Robot:
     """The robot with every joint of its file: geometry hangs on those.
 
     Raises:
+        ModelLoadError: it was read from an SDF, whose shapes are not read.
         InvalidInputError: the robot has no description to read geometry from.
     """
     description = robot.description
@@ -33,6 +34,11 @@ def whole_robot(robot: Robot) -> Robot:
         raise InvalidInputError(
             f"robot {robot.name!r} was given as a model, without geometry. Give each contact its "
             "polygon, or load the robot from its URDF or MJCF."
+        )
+    if description.language == "sdf":
+        raise ModelLoadError(
+            "the shapes of an SDF are not read. Give the contacts their polygons "
+            "(--sole X0:X1:Y0:Y1)."
         )
     if robot.mjcf is None:
         return Robot.from_description(description, name=robot.name)
@@ -54,7 +60,8 @@ def link_shapes(
         where: which geometry that is, for an error.
 
     Raises:
-        ModelLoadError: a mesh is missing or unreadable, or an MJCF's drawn geometry was asked for.
+        ModelLoadError: a mesh is missing or unreadable, or geometry was asked for that is not
+            read: an MJCF's drawn one, an SDF's.
         InvalidInputError: the robot has no description to read geometry from.
     """
     model = whole_robot(robot).model

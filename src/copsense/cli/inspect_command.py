@@ -25,7 +25,7 @@ from copsense.cli.printing import echo_json
 def inspect(robot: str, package_dirs: tuple[str, ...], root: str | None, as_json: bool) -> None:
     """Inspect ROBOT: mass, joints, motors, feet and soles, and the `analyse` line to paste.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. Feet are found by
+    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Feet are found by
     geometry: what reaches lowest at rest. The line has been tried: the robot stands by it. In
     Python: copsense.robots.inspect_robot.
     """

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @click.option(
     "--robot",
     required=True,
-    help="Whose log it is: a preset, a URDF or MJCF file, or a stance file (.toml).",
+    help="Whose log it is: a preset, a URDF, MJCF or SDF file, or a stance file (.toml).",
 )
 @click.option(
     "--map",

@@ -103,8 +103,8 @@ def map_command(
 ) -> None:
     """Map the sensitivity of ROBOT over a space of postures, contacts in place.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF or MJCF. Evaluates a grid or a
-    sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
+    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Evaluates a grid or
+    a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
     from copsense.batch import BatchKernel

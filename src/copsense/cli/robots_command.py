@@ -15,7 +15,7 @@ from copsense.errors import CopsenseError, MissingExtraError
 def robots(as_json: bool) -> None:
     """List the robots known by name: joints, mass and contact frames.
 
-    Any other robot is given by the path of its URDF or MJCF.
+    Any other robot is given by the path of its URDF, MJCF or SDF.
     """
     from copsense.robots import PRESETS, load_robot
 

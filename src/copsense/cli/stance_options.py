@@ -126,7 +126,8 @@ def read_stance(
         return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
     if robot is None:
         raise click.UsageError(
-            "no robot is named. Give ROBOT (a preset, or a URDF or MJCF file), or --stance FILE.",
+            "no robot is named. Give ROBOT (a preset, or a URDF, MJCF or SDF file), or "
+            "--stance FILE.",
             click.get_current_context(silent=True),
         )
     check_package_dirs(package_dirs)  # a preset looks none up
@@ -171,6 +172,8 @@ def read_stance(
         width=width,
         drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
     )
+    if not isinstance(source, Robot):
+        echo_notes(stance.robot.notes)
     echo_notes(soles_read(stance))
     return written(
         put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs

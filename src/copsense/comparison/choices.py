@@ -50,8 +50,8 @@ class RobotChoice:
     """A robot and its soles.
 
     Attributes:
-        source: a preset's name, or the path of a URDF or MJCF; or of a stance file (.toml), which
-            says all the rest, and how the robot stands.
+        source: a preset's name, or the path of a URDF, MJCF or SDF; or of a stance file (.toml),
+            which says all the rest, and how the robot stands.
         name: in results; default the source.
         contacts: frames of the contacts; default the preset's.
         soles: frame -> rectangle (x0, x1, y0, y1) in the contact frame [m], instead of the sole

@@ -72,7 +72,7 @@ def compare_log(
 
     Args:
         log: what `read_log` returned.
-        robot: a preset's name, a URDF or MJCF, a `Robot`, or a stance with the contacts.
+        robot: a preset's name, a URDF, MJCF or SDF, a `Robot`, or a stance with the contacts.
         criteria: default `minimum_torque()` and `minimum_wrench(1.0)`.
         contacts: default those of the stance or preset, or the frames that the sensors serve.
         base: what puts the base in place.
@@ -207,7 +207,7 @@ def log_robot(
     """The robot of a log, and its own contacts where it has some.
 
     Args:
-        source: a preset's name, a URDF or MJCF, a stance file (.toml), a `Robot` or a stance.
+        source: a preset's name, a URDF, MJCF or SDF, a stance file (.toml), a `Robot` or a stance.
         package_dirs: folders that hold the packages of ``package://`` meshes.
 
     Raises:

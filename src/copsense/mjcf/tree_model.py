@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.errors import InvalidInputError, ModelLoadError
+from copsense.joint_models import along
 from copsense.mjcf.scene import body_label
 
 _HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
@@ -174,20 +175,11 @@ def _add_joint(
     if kind == _BALL:
         moved: Any = pin.JointModelSpherical()
     elif kind == _SLIDE:
-        moved, back = _along(axis, "P"), pin.SE3(np.eye(3), -reference * axis)
+        moved, back = along(axis, "P"), pin.SE3(np.eye(3), -reference * axis)
     else:
-        moved, back = _along(axis, "R"), pin.SE3(pin.exp3(-reference * axis), np.zeros(3))
+        moved, back = along(axis, "R"), pin.SE3(pin.exp3(-reference * axis), np.zeros(3))
     anchor = pin.SE3(np.eye(3), np.array(mj.jnt_pos[joint]))
     return int(model.addJoint(parent, moved, outer * anchor * back, name))
-
-
-def _along(axis: np.ndarray, kind: str) -> Any:
-    """A hinge ("R") or slide ("P"), of Pinocchio's simpler kinds where the axis is one of them."""
-    for letter, unit in zip("XYZ", np.eye(3), strict=True):
-        if np.array_equal(axis, unit):
-            return getattr(pin, f"JointModel{kind}{letter}")()
-    unaligned = {"R": pin.JointModelRevoluteUnaligned, "P": pin.JointModelPrismaticUnaligned}
-    return unaligned[kind](axis / np.linalg.norm(axis))
 
 
 def _inertia(mj: Any, body: int) -> pin.Inertia:

@@ -128,7 +128,10 @@ def _clouds(
     """Joint -> points of its shapes in the world, and what could not be read."""
     if robot.description is None:
         return {}, ()
-    whole = whole_robot(robot).model
+    try:
+        whole = whole_robot(robot).model
+    except ModelLoadError as error:
+        return {}, (str(error),)
     owners = _owners(robot, whole)
     wanted = [own for own, (joint, _) in owners.items() if joint in joints]
     notes: list[str] = []
