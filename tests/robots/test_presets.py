@@ -20,7 +20,8 @@ def test_preset_stands_on_level_ground_with_its_com_over_the_middle_of_its_feet(
     np.testing.assert_allclose(origins.mean(axis=0), 0, rtol=0, atol=1e-11)
     np.testing.assert_allclose(stance.com[:2], 0, rtol=0, atol=1e-11)
     assert stance.com[2] > 0.1
-    assert not copsense.solve_equilibrium(stance, copsense.minimum_torque()).pulling
+    least = copsense.minimum_wrench(1.0)  # heel and toe may push against each other
+    assert not copsense.solve_equilibrium(stance, copsense.minimum_torque(tie_break=least)).pulling
 
 
 @pytest.mark.parametrize("name", [*sorted(BIPEDS), "iCubGenova04", "iCubLisboa01"])

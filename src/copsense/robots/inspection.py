@@ -154,7 +154,7 @@ def inspect_robot(
     """Inspect a robot: its joints and motors, the feet found by geometry, and how it stands.
 
     Args:
-        source: a preset's name, the path of a URDF or MJCF, or a `Robot`.
+        source: a preset's name, the path of a URDF, MJCF or SDF, or a `Robot`.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         root: body of the robot that is meant, where an MJCF holds several.
 

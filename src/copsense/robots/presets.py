@@ -19,6 +19,7 @@ from copsense.contact import Contact, rectangle
 from copsense.content import ShortRepr, freeze
 from copsense.errors import MissingExtraError, ModelLoadError
 from copsense.robot import Robot
+from copsense.robots.cassie import cassie_contacts, cassie_posture, cassie_robot
 from copsense.robots.four_bar import four_bar_angles, four_bar_robot
 
 
@@ -123,17 +124,26 @@ def _icub(model: str, name: str, joints: tuple[str, ...] | None = None) -> Robot
     return robot.keeping(joints) if joints else robot
 
 
-def _example(path: str, name: str, locked: tuple[str, ...] = ()) -> Robot:
-    """A robot of example-robot-data, a package of data without a Python module."""
+def example_file(path: str, name: str) -> tuple[Path, Path]:
+    """A file of example-robot-data, a package of data without a Python module; its share folder."""
     folders = [Path(entry) / "cmeel.prefix" / "share" for entry in sys.path]
     folders.append(Path(sys.prefix) / "share")
     for share in folders:
         file = share / "example-robot-data" / "robots" / path
         if file.is_file():
-            robot = Robot.from_urdf(file, name=name, package_dirs=[share])
-            keep = [j for j in robot.joint_names if not any(part in j for part in locked)]
-            return robot.keeping(keep) if locked else robot
+            return file, share
     raise MissingExtraError("example-robot-data", "robots", f"robot {name!r}")
+
+
+def _example(path: str, name: str, locked: tuple[str, ...] = ()) -> Robot:
+    file, share = example_file(path, name)
+    robot = Robot.from_urdf(file, name=name, package_dirs=[share])
+    keep = [j for j in robot.joint_names if not any(part in j for part in locked)]
+    return robot.keeping(keep) if locked else robot
+
+
+def _cassie() -> Robot:
+    return cassie_robot(example_file("cassie_description/robots/cassie_v2.sdf", "cassie")[0])
 
 
 def _frame_rotation(x: str, y: str, z: str) -> Float[np.ndarray, "3 3"]:
@@ -281,6 +291,14 @@ _LISTED = (
         _points("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
         _sides({"*L_thigh_joint": 51.6, "*L_calf_joint": -103.0}, "F", "R")
         | _sides({"*R_thigh_joint": 51.6, "*R_calf_joint": -103.0}, "F", "R"),
+        sole_from_geometry=None,
+    ),
+    Preset(
+        "cassie",
+        "Agility Cassie, ten motors and rods, on the lines under its feet; leaf springs straight",
+        _cassie,
+        cassie_contacts(),
+        cassie_posture(),
         sole_from_geometry=None,
     ),
     *(_icub_named(model) for model in ICUB_MODELS),

@@ -111,7 +111,7 @@ class StanceFile:
         if not isinstance(data.get("robot"), str):
             raise InvalidInputError(
                 f'the stance file {where} names no robot. Write, say, robot = "icub", or the path '
-                "of a URDF or MJCF from the file's own folder."
+                "of a URDF, MJCF or SDF from the file's own folder."
             )
         return cls(where, data)
 
@@ -281,7 +281,7 @@ def _source_of(robot: Robot) -> str:
     if path is None:
         raise InvalidInputError(
             f"robot {robot.name!r} was not read from a file, so a stance file cannot say where to "
-            "find it. Write it to a URDF or MJCF and give robot=."
+            "find it. Write it to a URDF, MJCF or SDF and give robot=."
         )
     return str(path)
 
