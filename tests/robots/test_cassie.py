@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from support.commands import copsense
 from support.mujoco_balance import missing_forces
 from support.statics_apart import frame_at, loop_gaps
 
@@ -17,7 +18,7 @@ from copsense import (
     solve_equilibrium,
 )
 from copsense.closing import close
-from copsense.errors import ModelLoadError
+from copsense.errors import ModelLoadError, UndeterminedWrenchError
 from copsense.robots.cassie import cassie_robot
 from copsense.robots.presets import example_file
 
@@ -82,6 +83,18 @@ def test_mujoco_needs_no_other_force(cassie, criterion):
 @pytest.mark.parametrize("criterion", CRITERIA, ids=lambda c: c.name)
 def test_sensitivity_is_what_finite_differences_find(cassie, criterion):
     check_sensitivity(cassie, criterion)
+
+
+def test_heel_and_toe_may_push_against_each_other_and_the_rows_are_named(cassie):
+    with pytest.raises(UndeterminedWrenchError, match="in left-toe fx") as caught:
+        solve_equilibrium(cassie, minimum_torque())
+    assert "rank 26 of 28 rows" in str(caught.value)
+
+
+def test_commands_say_what_differs_from_the_file():
+    answer = copsense("analyse", "cassie", "--criterion", "minimum-wrench")
+    for words in ("hinges are universal joints", "leaf springs are held straight"):
+        assert answer.err.count(words) == 1
 
 
 def bent(robot, *held):
