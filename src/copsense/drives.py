@@ -107,6 +107,11 @@ class Loop:
         """Check the kind and own the vectors."""
         check_name(self.frame_a, "frame_a of a loop")
         check_name(self.frame_b, "frame_b of a loop")
+        own = (self.frame_a, tuple(self.offset_a)) == (self.frame_b, tuple(self.offset_b))
+        if own and self.kind in LOOP_KINDS:
+            raise InvalidInputError(
+                f"a loop joins {self.frame_a!r} with itself. Give frames of two links."
+            )
         object.__setattr__(self, "name", self.name or f"{self.frame_a} - {self.frame_b}")
         check_name(self.name, "the name of a loop")
         if self.kind not in LOOP_KINDS:
@@ -155,12 +160,14 @@ class Transmission(ShortRepr):
                 "told apart. Give each motor an effect of its own."
             )
         if self.effort_limits is not None:
-            efforts = f"the effort limits of {', '.join(self.motors)}"
-            limits = tuple(finite_array(self.effort_limits, efforts, (None,)).tolist())
+            try:
+                limits = tuple(float(each) for each in self.effort_limits)
+            except (TypeError, ValueError):
+                limits = ()
             if len(limits) != len(self.motors) or not all(each > 0 for each in limits):
                 raise InvalidInputError(
-                    f"the effort limits of {', '.join(self.motors)} are {self.effort_limits}. Give "
-                    "one positive number for each motor."
+                    f"the effort limits of {', '.join(self.motors)} are {self.effort_limits!r}. "
+                    "Give one positive number for each motor, infinity where it has no limit."
                 )
             object.__setattr__(self, "effort_limits", limits)
 

@@ -18,7 +18,7 @@ from scipy.linalg import block_diag, lapack
 from copsense import rigid_body
 from copsense.arrays import array_property, check_type, read_only
 from copsense.closures import RANK as CLOSURE_RANK
-from copsense.closures import Closures
+from copsense.closures import Closures, joined
 from copsense.contact import COMPONENT_NAMES, Contact, Plane
 from copsense.errors import (
     ContactGeometryError,
@@ -39,6 +39,7 @@ from copsense.row_space import RowSpace
 RANK_TOLERANCE = 1e-6
 # Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
 _CURVED = 1e-4
+_ROUNDING = 1e-13  # of the largest column of J: what is smaller moves no contact and no loop
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
@@ -270,7 +271,12 @@ class Stance:
     @array_property
     def _constraints(self) -> Float[np.ndarray, "c nv"]:
         assert self.closures is not None
-        return np.concatenate([self.jacobian, self.closures.independent])
+        rows = np.concatenate([self.jacobian, self.closures.independent])
+        # A rod that spins about its own axis moves nothing: what rounding leaves of its column
+        # would be scaled up into a row of the balance that no force but a huge one meets.
+        size = np.linalg.norm(rows, axis=0)
+        rows[:, size < _ROUNDING * size.max(initial=0.0)] = 0.0
+        return rows
 
     @array_property
     def com(self) -> Float[np.ndarray, " 3"]:
@@ -326,12 +332,20 @@ class Stance:
 
         Only gravity, loads, springs and held torques act on them, which `balance` must be zero of.
         """
-        robot = self.robot
+        robot, model = self.robot, self.robot.model
         if robot.actuation is None:
             return ()
-        idle = ~(
-            robot.actuation.matrix.any(axis=1) | self.constraints[:, robot.base_nv :].any(axis=0)
-        )
+        # By what carries what: a rod that comes to lie along an axis is held by its loop still.
+        supports = [set(model.supports[i]) for i in range(model.njoints)]
+        held = set().union(*(self.limb(contact) for contact in self.contacts))
+        for pair in joined(robot):
+            held |= supports[pair.a.joint] ^ supports[pair.b.joint]
+        for coupling in robot.drives.couplings:
+            held |= {robot.joint_id(coupling.joint), robot.joint_id(coupling.of)}
+        idle = np.asarray(~robot.actuation.matrix.astype(bool).any(axis=1))
+        for i in held - {0, 1}:
+            start = model.joints[i].idx_v - robot.base_nv
+            idle[start : start + model.joints[i].nv] = False
         return tuple(int(i) + robot.base_nv for i in np.flatnonzero(idle))
 
     @array_property
@@ -744,7 +758,7 @@ def check_at_rest(stance: Stance, what: str) -> None:
 
 
 def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:
-    alone = isinstance(loads, Load | SpringLoad) or not isinstance(loads, Iterable)
+    alone = isinstance(loads, Load | SpringLoad | str) or not isinstance(loads, Iterable)
     given: tuple[AnyLoad, ...] = (loads,) if alone else tuple(loads)  # type: ignore[assignment]
     for load in given:
         if not isinstance(load, Load | SpringLoad):

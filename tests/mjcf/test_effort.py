@@ -47,3 +47,13 @@ def test_the_joints_own_range_of_actuator_forces_counts_too():
     )
     limits = dict(zip(robot.torque_names, robot.effort_limits, strict=True))
     assert limits["l_knee"] == 60.0
+
+
+def test_a_tendons_motor_without_a_range_has_no_limit():
+    tendon = (
+        "<tendon><fixed name='both'><joint joint='l_knee' coef='1'/><joint joint='r_knee' "
+        "coef='1'/></fixed></tendon><actuator><motor tendon='both'/></actuator>"
+    )
+    robot = copsense.load_robot(walker(tail=tendon))
+    limits = dict(zip(robot.torque_names, robot.effort_limits, strict=True))
+    assert np.inf in limits.values()

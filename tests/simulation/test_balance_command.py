@@ -11,10 +11,18 @@ import pytest
 import xarray as xr
 from support.commands import copsense
 from support.driven_files import sprung_rods
+from support.walkers import BIPED, NO_ANKLE_ROLL, bent, walker
 
-from copsense import Drives, load_stance, minimum_torque, solve_equilibrium
+from copsense import (
+    Drives,
+    load_stance,
+    minimum_torque,
+    minimum_wrench,
+    solve_equilibrium,
+)
 from copsense.drives import Coupling
 from copsense.freedom import closure_notes
+from copsense.robots import save_stance
 from copsense.simulation import Recording
 
 
@@ -306,3 +314,32 @@ def test_a_coupling_that_all_but_repeats_the_contacts_is_said_to():
     assert "note: Loops and couplings all but repeat what the contacts hold" in said
     drives = Drives(couplings=(Coupling("r_hip_yaw", "l_hip_yaw", 1.0),))
     assert closure_notes(load_stance("icub", drives=drives)) == ()
+
+
+def test_a_stance_files_criterion_shares_the_load(tmp_path):
+    stance = load_stance("solo12")
+    path = tmp_path / "stance.toml"
+    save_stance(stance, path, criteria=[minimum_wrench(0.4)])
+    run = ("balance", "--stance", path, "--duration", 0.02)
+    assert "solo12 under minimum-wrench" in copsense(*run).out
+    assert "solo12 under minimum-torque" in copsense(*run, "--criterion", "minimum-torque").out
+    save_stance(stance, path, criteria=[minimum_wrench(0.4), minimum_torque()], overwrite=True)
+    assert "the stance file has 2 criteria" in copsense(*run).error
+
+
+def test_loads_that_lift_the_robot_are_an_error():
+    answer = copsense("balance", "icub", "--load", "l_hand=0:0:400", "--duration", 0.02)
+    assert "lift it by 75.7 N more than its weight" in answer.error
+
+
+def test_legs_that_hold_the_com_sideways_hold_still(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(walker(NO_ANKLE_ROLL))
+    words = [w for frame in BIPED for w in ("--contact", frame)]
+    words += [w for j, a in bent().items() for w in ("--posture", f"{j}={np.degrees(a)}")]
+    run = ("balance", path, *words, "--contact-at", "sole", "--duration", 0.05)
+    answer = copsense(*run, "--criterion", "minimum-wrench")
+    assert answer.code == 0, answer.err
+    assert "no contact tipped" in answer.out
+    leans = copsense(*run, "--reference", "ramp:5mm").error
+    assert "hold the CoM's y fast" in leans

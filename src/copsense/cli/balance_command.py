@@ -19,7 +19,7 @@ from copsense.cli.controller_options import (
     read_gains,
     read_own_controller,
 )
-from copsense.cli.criterion_options import one_criterion_options, read_criteria
+from copsense.cli.criterion_options import one_criterion_options, read_criterion
 from copsense.cli.disturbance_options import (
     REFERENCES,
     disturbance_options,
@@ -130,7 +130,6 @@ def balance(
 
         check_output(video, suffixes=(".mp4",), overwrite=force)
         check_video()
-    (criterion,) = read_criteria(criteria or ("minimum-torque",), characteristic_length)
     course = read_signal(reference)
     scenario = Scenario(
         natural_duration(course) if duration is None else duration,
@@ -141,6 +140,7 @@ def balance(
     )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
     scenario.check_stance(stance)
+    criterion = read_criterion(criteria, characteristic_length)
     own = None if controller is None else read_own_controller(controller, gain, stance)
     total = round(scenario.duration / scenario.control_period)
     with progress_bar(total, "balancing", "step") as update, _interrupts() as stop:

@@ -10,6 +10,7 @@ import click
 from copsense.cli.option_lists import F, with_options
 from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import LENGTH
+from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
@@ -45,6 +46,24 @@ def _options(how_many: str) -> list[Callable[[Any], Any]]:
             help="Length L [m] that makes moments comparable with forces in minimum-wrench.",
         ),
     ]
+
+
+def read_criterion(names: tuple[str, ...], characteristic_length: float) -> Criterion:
+    """The one criterion named, or the stance file's, or the minimum torque.
+
+    Raises:
+        InvalidInputError: the file has several.
+    """
+    file = remembered_stance()
+    if not names and (file is None or not file.criteria):
+        names = ("minimum-torque",)
+    found = read_criteria(names, characteristic_length)
+    if len(found) > 1:
+        raise InvalidInputError(
+            f"the stance file has {len(found)} criteria, and a robot balances under one. Name it: "
+            f"--criterion {found[0].name}, or leave the others out of the file."
+        )
+    return found[0]
 
 
 def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:

@@ -20,7 +20,8 @@ from jaxtyping import Float
 from copsense.arrays import check_type, finite_number
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnreachablePostureError
-from copsense.path import PosturePath, lateral_sweep
+from copsense.freedom import held_com_axes
+from copsense.path import COM_COORDINATES, PosturePath, com_sweep, lateral_sweep
 from copsense.stance import Stance, check_stance
 
 _SPACING = 2e-3  # m between the postures of a lateral reference
@@ -275,6 +276,13 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     check_stance(stance)
     _check_signal(signal)
     low, high = signal.extent
+    if low == high == 0 and 1 in held_com_axes(stance):
+        # To hold still needs a path, whichever: along what the contacts leave to the CoM.
+        free = [axis for axis in (0, 2) if axis not in held_com_axes(stance)]
+        if free:
+            name, at = COM_COORDINATES[free[0]], float(stance.com[free[0]])
+            around = com_sweep(stance, name, at - _SPACING, at + _SPACING, 3)
+            return PathReference(around.shifted(-at), signal)
     start, ground = float(stance.com[1]), min(p.translation[2] for p in stance.placements)
     if max(abs(low), abs(high)) > stance.com[2] - ground:
         raise UnreachablePostureError(

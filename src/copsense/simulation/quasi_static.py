@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.controllers.target import Signal
+from copsense.errors import InvalidInputError
 from copsense.stance import Stance
 from copsense.sway_levers import STATIC_SHARE, net_lever, static_frequency
 
@@ -53,6 +54,11 @@ def quasi_static(stance: Stance, tangent: Float[np.ndarray, " nv"], signal: Sign
     g = stance.robot.weight / stance.robot.mass
     if stance.applied is not None:  # what of the weight the loads leave to the ground
         g -= float(stance.applied.wrenches[:, 2].sum()) / stance.robot.mass
+    if g <= 0:
+        raise InvalidInputError(
+            f"the loads on {stance.robot.name!r} lift it by {-g * stance.robot.mass:.1f} N more "
+            "than its weight: no contact that only pushes can hold it. Give smaller loads."
+        )
     along, across, speed = net_lever(stance, tangent)
     lever = math.hypot(along, across)
     excess = lever * speed * peak_acceleration(signal) / g
