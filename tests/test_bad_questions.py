@@ -184,6 +184,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
         errors.InfeasibleError(3.0, ("l_sole: normal force",)),
         errors.UnsolvedError(1e-3),
         errors.UnbalancedError("rods", {"forearm": 0.8}),
+        errors.UnstablePostureError("rods", ("forearm",), -0.8),
         *(
             e("said")
             for e in family
@@ -196,6 +197,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
                 errors.InfeasibleError,
                 errors.UnsolvedError,
                 errors.UnbalancedError,
+                errors.UnstablePostureError,
             }
         ),
     ]

@@ -31,7 +31,7 @@ INTERNAL = (
     "copsense.plots.reading",
     "copsense.quadratic",
     "copsense.robots.stance_file",  # a file that is being read
-    "copsense.statics.lexicographic",
+    "copsense.statics.tied_optimum",
     "copsense.statics.program",
 )
 IN_THE_LOOP = {"Command", "Observation", "Snapshot", "Target"}  # good until the next step

@@ -235,7 +235,11 @@ def test_the_limit_named_is_the_one_at_its_bound(stance_of, robot):
 
 @pytest.mark.parametrize(
     ("options", "says"),
-    [({"reach": np.nan}, "reach"), ({"reach": 0.0}, "reach"), ({"samples": 0}, "1 sample or more")],
+    [
+        ({"reach": np.nan}, "reach"),
+        ({"reach": 0.0}, "reach"),
+        ({"samples": 0}, "a whole number from 1"),
+    ],
 )
 def test_a_search_of_nothing_is_rejected(icub, options, says):
     for search in (limit_travel, copsense.scan.next_active_set_change):

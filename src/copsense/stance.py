@@ -158,7 +158,7 @@ class Stance:
 
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
-        given = tuple(loads) if isinstance(loads, Iterable) else loads
+        given = _known_loads(loads)
         return Stance(self.robot, self.q, self.contacts, loads=given, motion=self.motion)
 
     def moving(self, velocity: ArrayLike, acceleration: ArrayLike) -> Stance:
@@ -757,7 +757,7 @@ def check_at_rest(stance: Stance, what: str) -> None:
         )
 
 
-def _known_loads(loads: Sequence[AnyLoad]) -> tuple[AnyLoad, ...]:
+def _known_loads(loads: Iterable[AnyLoad]) -> tuple[AnyLoad, ...]:
     alone = isinstance(loads, Load | SpringLoad | str) or not isinstance(loads, Iterable)
     given: tuple[AnyLoad, ...] = (loads,) if alone else tuple(loads)  # type: ignore[assignment]
     for load in given:

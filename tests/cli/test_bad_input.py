@@ -74,7 +74,7 @@ from copsense.files import load_configurations
         ("balance icub --gain com-stiffness=-3", "the gain com-stiffness is -3"),
         ("balance icub --gain com-damping=nan", "gain com_damping is not finite"),
         ("analyse icub --package-dir absent", "no folder 'absent' to look"),
-        ("design icub --com-y 0:1:1", "a path of 5 postures or more, this one has 1"),
+        ("design icub --com-y 0:1:1", "5 postures of the path or more, around its middle; 1 of 1"),
         ("reproduce --output absent/report", "Create it first"),
         ("reproduce --output /proc/report", "cannot be written"),
         ("sweep icub", "say what to sweep"),

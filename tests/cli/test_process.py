@@ -13,7 +13,7 @@ import pytest
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
     "robots", "inspect", "analyse", "sweep", "plot", "map", "push", "design", "balance",
-    "benchmark", "four-bar", "reproduce",
+    "log", "identify", "benchmark", "four-bar", "reproduce",
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",
@@ -97,11 +97,11 @@ def test_ctrl_c_in_the_middle_of_a_sweep_leaves_no_file(tmp_path):
         # A job in the background of a script is born deaf to it.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "module = importlib.import_module('copsense.sweeps')\n"
-        "real, count = module.cop_sensitivity, itertools.count()\n"
+        "real, count = module.evaluate_row, itertools.count()\n"
         "def interrupted(*args):\n"
         "    if next(count) == 2: signal.raise_signal(signal.SIGINT)\n"
         "    return real(*args)\n"
-        "module.cop_sensitivity = interrupted\n" + ENTRY
+        "module.evaluate_row = interrupted\n" + ENTRY
     )
     (tmp_path / "kept.nc").write_text("old")
     output = ("--output", tmp_path / "kept.nc", "--force")

@@ -216,11 +216,6 @@ def test_redundant_contact_is_said_to_be_one(icub):
     assert found.residual() < 1e-9 * icub.robot.weight
 
 
-def test_criterion_that_needs_a_tie_break(icub):
-    with pytest.raises(UndeterminedWrenchError, match="tie-break"):
-        solve(icub, Limits(), copsense.minimum_tangential(WRENCH))
-
-
 def test_policy_with_limits_is_rejected(icub):
     wrenches = copsense.solve_equilibrium(icub, WRENCH).wrenches
     with pytest.raises(InvalidInputError, match="limits apply to a Criterion"):

@@ -38,8 +38,8 @@ from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 from copsense.statics.equilibrium import StaticEquilibrium
-from copsense.statics.lexicographic import Lexicographic
 from copsense.statics.program import NoPointError, Program
+from copsense.statics.tied_optimum import Lexicographic
 
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
