@@ -26,11 +26,11 @@ def spoiled(how):
 
 
 def nothing_active(flag, multipliers):
-    return flag, 0 * multipliers
+    return flag, np.zeros_like(multipliers)
 
 
 def all_active(flag, multipliers):
-    return flag, 0 * multipliers + 1
+    return flag, np.ones_like(multipliers)
 
 
 def one_more(flag, multipliers):
