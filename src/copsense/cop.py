@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array
@@ -27,8 +27,22 @@ def contact_cops(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
     """
     if equilibrium.unloaded:
         raise UnloadedContactError(equilibrium.unloaded)
-    w = equilibrium.wrenches
-    return w[:, 4:2:-1] * (-1.0, 1.0) / w[:, 2:3]
+    return wrench_cops(equilibrium.wrenches)
+
+
+def wrench_cops(
+    wrenches: Float[np.ndarray, "*n 6"], loaded: Bool[np.ndarray, "*n"] | None = None
+) -> Float[np.ndarray, "*n 2"]:
+    """Where wrenches on flat contacts have their centre of pressure, p = (-m_y, m_x) / f_z [m].
+
+    Args:
+        wrenches: in contact axes, about the contact frames [N, Nm].
+        loaded: which of them have one; the others are NaN. Default all.
+    """
+    normal = wrenches[..., 2:3]
+    if loaded is not None:
+        normal = np.where(loaded[..., None], normal, np.nan)
+    return np.asarray(wrenches[..., 4:2:-1] * (-1.0, 1.0) / normal)
 
 
 def edge_margin(polygon: ArrayLike, point: ArrayLike) -> EdgeMargin:

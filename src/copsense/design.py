@@ -27,7 +27,7 @@ from copsense.posture import supporting_joints
 from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
 from copsense.stance import Stance
-from copsense.statics import with_tie_breaks
+from copsense.statics import TIE_BREAK, with_tie_breaks
 
 Objective = Literal["travel", "gain"]
 NO_LIMIT = "none within the path"  # a score's first limit where the path ends before any
@@ -363,7 +363,7 @@ def score(
 
 
 def _tied(build: Callable[[Sequence[float]], Criterion], values: Sequence[float]) -> Criterion:
-    return replace(build(values), tie_break=minimum_wrench(1.0))
+    return replace(build(values), tie_break=TIE_BREAK)
 
 
 def _of_length(values: Sequence[float]) -> Criterion:

@@ -10,9 +10,9 @@ here, or that is known and changes the mechanics, is a fault.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections import Counter
 from collections.abc import Iterator
 
+from copsense.xml_names import wrong_names
 from copsense.xml_numbers import read_numbers
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "ball", "universal")
@@ -131,12 +131,8 @@ def sdf_faults(root: ET.Element) -> Iterator[str]:
     links, joints = model.findall("link"), model.findall("joint")
     if not links:
         yield "it has no link"
-    for kind, elements in (("link", links), ("joint", joints)):
-        for name, times in Counter(e.get("name", "") for e in elements).items():
-            if not name:
-                yield f"a {kind} has no name"
-            elif times > 1:
-                yield f"{times} {kind}s are named {name!r}"
+    yield from wrong_names("link", links)
+    yield from wrong_names("joint", joints)
     names = {link.get("name", "") for link in links}
     for joint in joints:
         yield from _joint_faults(joint, names)

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Iterator
 
+from copsense.xml_names import wrong_names
 from copsense.xml_numbers import read_numbers, wrong_number
 
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
@@ -57,12 +58,8 @@ def urdf_faults(root: ET.Element) -> Iterator[str]:
         yield "the <robot> has no name"
     if not links:
         yield "it has no link"
-    for kind, elements in (("link", links), ("joint", joints)):
-        for name, times in Counter(e.get("name", "") for e in elements).items():
-            if not name:
-                yield f"a {kind} has no name"
-            elif times > 1:
-                yield f"{times} {kind}s are named {name!r}"
+    yield from wrong_names("link", links)
+    yield from wrong_names("joint", joints)
     for joint in joints:
         yield from _joint_faults(joint, names)
     for body in links:

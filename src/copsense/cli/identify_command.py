@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
+from copsense.cli.log_options import log_options, read_shown, read_subject
 from copsense.cli.printing import echo_json, echo_notes, progress_bar
 from copsense.cli.units import read_quantity
 
@@ -15,12 +14,7 @@ from copsense.cli.units import read_quantity
     "  copsense identify com-sinusoid.mat --robot icub.urdf --family joints\n"
     "  copsense identify sway.nc --robot icub --family length --family mix --json"
 )
-@click.argument("file", type=click.Path())
-@click.option(
-    "--robot",
-    required=True,
-    help="Whose log it is: a preset, a URDF or MJCF file, or a stance file (.toml).",
-)
+@log_options
 @click.option(
     "--family",
     "families",
@@ -29,26 +23,6 @@ from copsense.cli.units import read_quantity
     help="What to identify: length (L of a minimum wrench), joints (torque weights of hips, knees, "
     "ankles), stiffness (of joints on position servos) or mix (of torques and wrenches). "
     "Repeatable; default all.",
-)
-@click.option(
-    "--map",
-    "map_file",
-    metavar="MAP.toml",
-    help="Which signal is what, as copsense log --save-map writes it; default what is recognised.",
-)
-@click.option(
-    "--contact",
-    "contacts",
-    multiple=True,
-    metavar="FRAME",
-    help="Contact frame; default the preset's, or those that the sensors serve. Repeatable.",
-)
-@click.option(
-    "--package-dir",
-    "package_dirs",
-    multiple=True,
-    type=click.Path(file_okay=False),
-    help="Folder in which package:// meshes are looked up. Repeatable.",
 )
 @click.option("--at-rest", is_flag=True, help="Leave the recorded motion's inertia out.")
 @click.option(
@@ -86,24 +60,16 @@ def identify(
     copsense.identification.identify_log.
     """
     from copsense.identification import identify_log
-    from copsense.logs import read_log
-    from copsense.logs.comparing import log_robot
 
     after = read_quantity(skip, "s")
-    on, known = log_robot(robot, package_dirs)
-    named = {contact.name: contact for contact in known}
-    feet = [named.get(name, name) for name in contacts] or list(known)
-    path = Path(file)
-    size = path.stat().st_size if path.is_file() else None
-    wanted = list(contacts) or list(named)
-    with progress_bar(size, f"reading {path.name}", "B") as advance:
-        log = read_log(file, map_file, robot=on, contacts=wanted, advance=advance)
+    subject = read_subject(robot, contacts, package_dirs)
+    log = read_shown(file, map_file, subject)
     with progress_bar(None, "identifying", "row") as advance:
         found = identify_log(
             log,
-            on,
+            subject.robot,
             families or None,
-            contacts=feet or None,
+            contacts=subject.feet,
             inertia=not at_rest,
             skip=after,
             postures=postures,
@@ -113,4 +79,4 @@ def identify(
         echo_json(found.to_dict())
         return
     click.echo(str(found))
-    echo_notes(on.notes)
+    echo_notes(subject.robot.notes)

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
+from copsense.cli.log_options import log_options, read_shown, read_subject
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError
-
-if TYPE_CHECKING:
-    from copsense.logs.log import Log
-    from copsense.robot import Robot
 
 
 @click.command(
@@ -24,33 +18,8 @@ if TYPE_CHECKING:
     "--contact right_ankle_roll_link --json\n"
     "  copsense log run.csv --robot icub --save-map run.toml"
 )
-@click.argument("file", type=click.Path())
-@click.option(
-    "--robot",
-    required=True,
-    help="Whose log it is: a preset, a URDF, MJCF or SDF file, or a stance file (.toml).",
-)
-@click.option(
-    "--map",
-    "map_file",
-    metavar="MAP.toml",
-    help="Which signal is what; default what the layout or the names of the signals say.",
-)
+@log_options
 @click.option("--save-map", metavar="MAP.toml", help="Write down what was recognised, and use it.")
-@click.option(
-    "--contact",
-    "contacts",
-    multiple=True,
-    metavar="FRAME",
-    help="Contact frame; default the preset's, or those that the sensors serve. Repeatable.",
-)
-@click.option(
-    "--package-dir",
-    "package_dirs",
-    multiple=True,
-    type=click.Path(file_okay=False),
-    help="Folder in which package:// meshes are looked up. Repeatable.",
-)
 @criterion_options
 @click.option(
     "--base",
@@ -107,7 +76,8 @@ def log(
     """
     from copsense.files import check_output
     from copsense.logs import compare_log
-    from copsense.logs.comparing import log_robot
+    from copsense.logs.opening import open_log_file
+    from copsense.logs.recognition import recognise
 
     for path, suffixes in ((picture, PICTURES), (save_map, (".toml",))):
         if path is not None:
@@ -117,18 +87,19 @@ def log(
     after = read_quantity(skip, "s")
     hertz = None if rate is None else read_quantity(rate, "Hz")
     chosen = read_criteria(criteria, characteristic_length)
-    on, known = log_robot(robot, package_dirs)
-    echo_notes(on.notes)
-    named = {c.name: c for c in known}
-    feet = [named.get(name, name) for name in contacts] or list(known)
-    wanted = list(contacts) or list(named)
-    found = _read(file, on, wanted, map_file, save_map, hertz, force)
+    subject = read_subject(robot, contacts, package_dirs)
+    echo_notes(subject.robot.notes)
+    if save_map is not None:
+        recognise(open_log_file(file), subject.robot, subject.wanted).save(
+            save_map, overwrite=force
+        )
+    found = read_shown(file, save_map or map_file, subject, hertz)
     with progress_bar(min(postures, len(found.times)), "comparing") as advance:
         comparison = compare_log(
             found,
-            on,
+            subject.robot,
             chosen,
-            contacts=feet or None,
+            contacts=subject.feet,
             base=base,  # type: ignore[arg-type]
             skip=after,
             postures=postures,
@@ -147,28 +118,3 @@ def log(
         click.echo(f"found: {finding.message}")
     echo_notes(comparison.notes)
     echo_written(picture, save_map)
-
-
-def _read(
-    file: str,
-    robot: Robot,
-    contacts: list[str],
-    map_file: str | None,
-    save_map: str | None,
-    rate: float | None,
-    force: bool,
-) -> Log:
-    """The log, with a bar while it is read, and the mapping written where asked for."""
-    from copsense.logs import read_log
-    from copsense.logs.opening import open_log_file
-    from copsense.logs.recognition import recognise
-
-    chosen = map_file
-    if save_map is not None:
-        recognised = recognise(open_log_file(file), robot, contacts)
-        recognised.save(save_map, overwrite=force)
-        chosen = save_map
-    path = Path(file)
-    size = path.stat().st_size if path.is_file() else None
-    with progress_bar(size, f"reading {path.name}", "B") as advance:
-        return read_log(file, chosen, robot=robot, contacts=contacts, rate=rate, advance=advance)

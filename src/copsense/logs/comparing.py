@@ -40,7 +40,7 @@ from copsense.logs.log_motion import (
     smoothing_window,
     stand_on_feet,
 )
-from copsense.logs.log_statics import LogStatics, load_shares, log_statics, wrench_cops
+from copsense.logs.log_statics import LogStatics, load_shares, loaded_cops, log_statics
 from copsense.logs.sway_fit import SlopeEstimate, Sway, find_sway, fit_sway
 from copsense.robot import Robot
 from copsense.robots import PRESETS, load_robot, load_stance
@@ -398,7 +398,7 @@ def _slopes(
         for axis, letter in enumerate("xy"):
             for source, wrenches in sources.items():
                 if contact.kind != "point":
-                    values = wrench_cops(wrenches)[:, k, axis]
+                    values = loaded_cops(wrenches)[:, k, axis]
                     fit(f"CoP {letter} of {contact.name}", source, values, 1.0)
     return sway, slopes
 

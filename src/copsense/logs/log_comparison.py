@@ -15,7 +15,7 @@ from copsense.errors import UnknownNameError
 from copsense.json_data import json_data
 from copsense.logs.finding import Finding
 from copsense.logs.log import Log
-from copsense.logs.log_statics import LogStatics, load_shares, wrench_cops
+from copsense.logs.log_statics import LogStatics, load_shares, loaded_cops
 from copsense.logs.sway_fit import SlopeEstimate, Sway
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class LogComparison:
     @property
     def cops(self) -> Float[np.ndarray, "M nc 2"]:
         """Measured centre of pressure of each contact, its axes (M, nc, 2) [m]; NaN where not."""
-        return wrench_cops(self.wrenches)
+        return loaded_cops(self.wrenches)
 
     def of(self, criterion: str, *, inertia: bool) -> LogStatics:
         """What a criterion says, at rest or in motion.

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 
 from copsense.contact import Contact
 from copsense.content import ShortRepr, freeze
+from copsense.cop import wrench_cops
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.load_problem import LoadProblem
@@ -54,7 +55,7 @@ class LogStatics(ShortRepr):
     @property
     def cops(self) -> Float[np.ndarray, "M nc 2"]:
         """Centre of pressure of each contact in its own frame (M, nc, 2) [m]."""
-        return wrench_cops(self.wrenches)
+        return loaded_cops(self.wrenches)
 
 
 def load_shares(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M nc"]:
@@ -63,12 +64,10 @@ def load_shares(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M n
     return np.asarray(normal / normal.sum(axis=1, keepdims=True))
 
 
-def wrench_cops(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M nc 2"]:
-    """Centres of pressure (-m_y, m_x) / f_z; NaN under next to no normal force."""
-    normal = wrenches[:, :, 2]
-    least = _LOADED * np.nansum(np.abs(normal), axis=1, keepdims=True)
-    loaded = np.where(np.abs(normal) > least, normal, np.nan)
-    return np.stack([-wrenches[:, :, 4] / loaded, wrenches[:, :, 3] / loaded], axis=2)
+def loaded_cops(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M nc 2"]:
+    """Centres of pressure [m]; NaN under next to no normal force."""
+    normal = np.abs(wrenches[:, :, 2])
+    return wrench_cops(wrenches, normal > _LOADED * np.nansum(normal, axis=1, keepdims=True))
 
 
 def log_statics(

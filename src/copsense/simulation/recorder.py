@@ -12,6 +12,7 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
+from copsense.cop import wrench_cops
 from copsense.ground import CONVENTIONS, ground_variables
 from copsense.simulation.events import Event
 from copsense.simulation.recording import Recording
@@ -181,8 +182,7 @@ def _cops(stance: Stance, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """Centres of pressure (N, nc, 2), NaN where unloaded, and their margins (N, nc)."""
     wrenches = wrenches.reshape(-1, len(stance.contacts), 6)
     loaded = wrenches[:, :, 2] > _LOADED * stance.robot.weight
-    fz = np.where(loaded, wrenches[:, :, 2], np.nan)
-    cops = np.stack([-wrenches[:, :, 4] / fz, wrenches[:, :, 3] / fz], axis=2)
+    cops = wrench_cops(wrenches, loaded)
     margins = np.full(cops.shape[:2], np.nan)
     for k, contact in enumerate(stance.contacts):
         if contact.sole:

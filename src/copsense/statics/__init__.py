@@ -23,10 +23,11 @@ from copsense.statics.equilibrium import (
     solve_static,
 )
 from copsense.statics.policy import WrenchPolicy, named_criteria, policy_name, wrench_policy
-from copsense.statics.tie_breaks import tie_break_note, with_tie_break, with_tie_breaks
+from copsense.statics.tie_breaks import TIE_BREAK, tie_break_note, with_tie_break, with_tie_breaks
 
 __all__ = [
     "PROJECT",
+    "TIE_BREAK",
     "ActiveLimit",
     "ActiveSetChange",
     "ConstrainedEquilibrium",

@@ -16,11 +16,12 @@ from copsense.statics.policy import WrenchPolicy
 
 C = TypeVar("C", Criterion, Criterion | WrenchPolicy)
 
+TIE_BREAK = minimum_wrench(1.0)
 _INTERNAL = 1e-8  # of J' f, for f of length one, under which no joint feels forces
 
 
 def with_tie_break(stance: Stance, criterion: Criterion) -> Criterion:
-    """The criterion, with ``minimum_wrench(1.0)`` as its tie-break where it needs one.
+    """The criterion, with `TIE_BREAK`, ``minimum_wrench(1.0)``, where it needs one.
 
     It needs one where contacts can push against each other without moving anything (heel and toe
     of one foot, four points under it, a leg of five joints): such forces cost nothing that the
@@ -33,7 +34,7 @@ def with_tie_break(stance: Stance, criterion: Criterion) -> Criterion:
     try:
         Kkt(stance, criterion)
     except UndeterminedWrenchError as error:
-        tied = replace(criterion, tie_break=minimum_wrench(1.0))
+        tied = replace(criterion, tie_break=TIE_BREAK)
         free = Kkt(stance, tied).free
         felt = np.abs(stance.constraints.T @ free).max(initial=0.0)
         if criterion.tie_break is not None or felt > _INTERNAL:

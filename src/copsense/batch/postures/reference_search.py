@@ -111,13 +111,11 @@ def _advance(
             rows[:, : here.robot.base_nv] = rows[:, : here.robot.base_nv] @ _base_rates(here, given)
             J = np.vstack([J, rows[:, list(limb.unknowns)]])
             step = -np.linalg.lstsq(J, np.concatenate([e, errors]), rcond=RANK_TOLERANCE)[0]
-            longest = float(np.abs(step).max(initial=0.0))
-            given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
-            continue
-        # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
-        M = J @ J.T
-        mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
-        step = -J.T @ np.linalg.solve(M + mu * np.eye(len(M)), e)
+        else:
+            # s J' (J J' + mu 1)^-1 h, mu = c |h|^2 + floor.
+            M = J @ J.T
+            mu = DAMPING * float(e @ e) + FLOOR * float(np.trace(M)) + TINY
+            step = -J.T @ np.linalg.solve(M + mu * np.eye(len(M)), e)
         longest = float(np.abs(step).max(initial=0.0))
         given[list(limb.unknowns)] += LONGEST_STEP / max(longest, LONGEST_STEP) * step
 

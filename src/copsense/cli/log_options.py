@@ -1,0 +1,91 @@
+"""Log options: a robot's own log, whose it is, and what of it stands for what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import click
+
+from copsense.cli.option_lists import F, with_options
+from copsense.cli.printing import progress_bar
+
+if TYPE_CHECKING:
+    from copsense.contact import Contact
+    from copsense.logs.log import Log
+    from copsense.robot import Robot
+
+_OPTIONS = (
+    click.argument("file", type=click.Path()),
+    click.option(
+        "--robot",
+        required=True,
+        help="Whose log it is: a preset, a URDF, MJCF or SDF file, or a stance file (.toml).",
+    ),
+    click.option(
+        "--map",
+        "map_file",
+        metavar="MAP.toml",
+        help="Which signal is what, as copsense log --save-map writes it; default what the layout "
+        "or the names of the signals say.",
+    ),
+    click.option(
+        "--contact",
+        "contacts",
+        multiple=True,
+        metavar="FRAME",
+        help="Contact frame; default the preset's, or those that the sensors serve. Repeatable.",
+    ),
+    click.option(
+        "--package-dir",
+        "package_dirs",
+        multiple=True,
+        type=click.Path(file_okay=False),
+        help="Folder in which package:// meshes are looked up. Repeatable.",
+    ),
+)
+
+
+class LogSubject(NamedTuple):
+    """Whose log a command reads.
+
+    Attributes:
+        robot: the robot.
+        feet: its contacts, or names of frames; None for those that the sensors serve.
+        wanted: names of contacts to look for in the log.
+    """
+
+    robot: Robot
+    feet: list[Contact | str] | None
+    wanted: list[str]
+
+
+def log_options(command: F) -> F:
+    """A command with FILE, --robot, --map, --contact and --package-dir."""
+    return with_options(_OPTIONS, command)
+
+
+def read_subject(
+    robot: str, contacts: tuple[str, ...], package_dirs: tuple[str, ...]
+) -> LogSubject:
+    """The robot and contacts that the options name."""
+    from copsense.logs.comparing import log_robot
+
+    on, known = log_robot(robot, package_dirs)
+    named = {contact.name: contact for contact in known}
+    feet = [named.get(name, name) for name in contacts] or list(known)
+    return LogSubject(on, feet or None, list(contacts) or list(named))
+
+
+def read_shown(
+    file: str, map_file: str | None, subject: LogSubject, rate: float | None = None
+) -> Log:
+    """The log, with a bar while it is read."""
+    from copsense.logs import read_log
+
+    path = Path(file)
+    size = path.stat().st_size if path.is_file() else None
+    with progress_bar(size, f"reading {path.name}", "B") as advance:
+        return read_log(
+            file, map_file, robot=subject.robot, contacts=subject.wanted, rate=rate, advance=advance
+        )
