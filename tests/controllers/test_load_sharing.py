@@ -3,17 +3,28 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
+from statics.test_tie_break_within_limits import TIED, cases, corners
 from support.grounds import off_centre
 from support.loads import CRITERIA, criteria
+from support.walkers import BIPED, NO_ANKLE_ROLL, bent, walker
 
 import copsense
-from copsense.controllers import ShareByCriterion
+from copsense.controllers import (
+    BalancingController,
+    Hold,
+    Observation,
+    ShareByCriterion,
+    lateral_reference,
+)
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.statics import share_load
+
+__all__ = ["corners"]  # a fixture
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +64,44 @@ def test_a_controllers_share_within_limits_is_the_statics(posture, criterion, li
     exact = copsense.solve_equilibrium(posture, criterion, limits)
     quick = ShareWithinLimits(posture, criterion, limits)(LoadProblem.of(posture))
     assert np.abs(quick - exact.forces).max() < 1e-6 * posture.robot.weight
+
+
+def test_a_controllers_share_within_limits_breaks_ties_as_the_statics_do(corners, icub):
+    pressed = 0
+    for stance, criterion, limits, exact in cases(corners, icub, 24, seed=5):
+        quick = ShareWithinLimits(stance, criterion, limits)(LoadProblem.of(stance))
+        assert np.abs(quick - exact.forces).max() < 1e-6 * stance.robot.weight
+        pressed += bool(exact.active)
+    assert pressed > 10
+
+
+@pytest.mark.parametrize(
+    "limits", [None, Limits(friction=0.6, cop_margin=0.025)], ids=["", "within"]
+)
+def test_feet_that_lean_a_little_change_a_controllers_command_a_little(limits):
+    # Motors of legs without ankle roll feel their internal forces as soon as a foot leans.
+    limbs = {"l": (0, 0.1), "r": (0, -0.1), "left_arm": (0, 0.3), "right_arm": (0, -0.3)}
+    stance = copsense.load_stance(
+        walker(NO_ANKLE_ROLL, legs=limbs), contacts=BIPED, contact_at="sole", posture=bent()
+    )
+    controller = BalancingController(stance, TIED, limits=limits)
+    target, model = lateral_reference(stance, Hold()).at(0.0), stance.robot.model
+    rng = np.random.default_rng(2)
+    lean, v, still = rng.standard_normal(model.nv), np.zeros(model.nv), np.zeros((2, 6))
+
+    hurried = replace(target, com_acceleration=np.array([0.2, 0.3, 0.1]))
+
+    def command(size, target=hurried):
+        q = pin.integrate(model, stance.q, size * lean)
+        return controller(Observation(0.0, q, v, target, still))
+
+    weight, hurry = stance.robot.weight, command(0.0)
+    statics = copsense.solve_equilibrium(stance, TIED, limits)
+    assert np.abs(command(0.0, target).wrenches - statics.wrenches).max() < 1e-6 * weight
+    for size in (1e-7, 1e-6, 1e-5, 1e-4, 1e-3):
+        moved = command(size)
+        assert np.abs(moved.wrenches - hurry.wrenches).max() < 100 * size * weight
+        assert np.abs(moved.torques - hurry.torques).max() < 100 * size * weight
 
 
 @pytest.mark.parametrize("criterion", [copsense.minimum_wrench(1.0), copsense.minimum_torque()])

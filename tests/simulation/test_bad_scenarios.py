@@ -29,6 +29,7 @@ from copsense.errors import (
     UndeterminedWrenchError,
     UnknownNameError,
     UnreachablePostureError,
+    UnsolvedError,
 )
 from copsense.simulation import (
     FrictionChange,
@@ -133,6 +134,17 @@ def test_a_controller_that_raises(kind):
 
     with pytest.raises(ControllerError, match=r"'broken' at 0.000 s raised.*out of ideas"):
         rollout(Statue(icub()), broken, Scenario(0.1))
+
+
+def test_an_error_of_copsenses_own_says_itself_what_to_do():
+    error = UnsolvedError(0.1)
+
+    def puzzled(observation):
+        raise error
+
+    with pytest.raises(ControllerError) as raised:
+        rollout(Statue(icub()), puzzled, Scenario(0.1))
+    assert str(raised.value).endswith(f"found no torques (UnsolvedError): {error}")
 
 
 @pytest.mark.parametrize("wrenches", [np.zeros((3, 6)), np.full((2, 6), np.nan)])

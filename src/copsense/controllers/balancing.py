@@ -99,13 +99,18 @@ class BalancingController:
         self._gravity = np.array(stance.robot.model.gravity.linear)
         self._com_gains = np.array(gains.com_stiffness), np.array(gains.com_damping)
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
+        self._redundant = 0  # rows of J_s that depend on others at the stance
         self._driven: DrivenTorques | None = None
         if isinstance(self._dynamics, DrivenDynamics):
             self._driven = DrivenTorques(stance, self._dynamics)
             inertia = self._driven.inertia()
         else:
-            decoupled = M[6:, 6:] - M[6:, :6] @ np.linalg.solve(M[:6, :6], M[:6, 6:])
-            inertia = 1.0 / np.diag(np.linalg.inv(decoupled))
+            T = np.linalg.solve(M[:6, :6], M[:6, 6:])
+            mobile = np.linalg.inv(M[6:, 6:] - M[6:, :6] @ T)
+            inertia = 1.0 / np.diag(mobile)
+            Js = self._dynamics.J[:, 6:] - self._dynamics.J[:, :6] @ T
+            values = np.linalg.eigvalsh(Js @ mobile @ Js.T)
+            self._redundant = int(np.sum(values <= _RANK * values[-1]))
         scale = inertia if gains.scaled_by_inertia else 1.0
         self._posture_gains = -kp * scale, -kd * scale
         # Where each stacked force stands among the wrenches.
@@ -169,7 +174,7 @@ class BalancingController:
         free = solved[:, m + 2]
         free[:6] = solved[:6, m + 1]
         # Matrices this small are multiplied with `dot`: it takes half the time of `@`.
-        mu = _solve(Y.T.dot(Y), -bias - solved[:, :m].T.dot(free))
+        mu = self._reactions(Y.T.dot(Y), -bias - solved[:, :m].T.dot(free))
         Ls = L[6:, 6:]
         offset = Ls.dot(k + p + Y.dot(mu))
         joint_map = Ls.dot(Y)
@@ -177,10 +182,16 @@ class BalancingController:
         forces = self._share(problem)
         return offset - joint_map.dot(forces), forces
 
-
-def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve a symmetric system; the least solution where contacts are redundant."""
-    factor, solved, info = lapack.dposv(matrix, right, lower=1)
-    if info == 0 and well_determined(matrix, factor, _RANK):
-        return np.asarray(solved)
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-10)[0])
+    def _reactions(
+        self, mobility: Float[np.ndarray, "m m"], right: Float[np.ndarray, " m"]
+    ) -> Float[np.ndarray, " m"]:
+        """mu; the smallest where contacts are redundant."""
+        if not self._redundant:
+            factor, solved, info = lapack.dposv(mobility, right, lower=1)
+            if info == 0 and well_determined(mobility, factor, _RANK):
+                return np.asarray(solved)
+        values, vectors = np.linalg.eigh(mobility)
+        # At least as many as at the stance, which a foot that leans a little must not change.
+        lost = max(self._redundant, int(np.sum(values <= _RANK * values[-1])))
+        on = vectors[:, lost:]
+        return np.asarray(on.dot(on.T.dot(right) / values[lost:]))

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from copsense.arrays import finite_array, is_finite
 from copsense.content import ShortRepr
 from copsense.controllers.target import Target
-from copsense.errors import ControllerError, InvalidInputError
+from copsense.errors import ControllerError, CopsenseError, InvalidInputError
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,10 +88,14 @@ def ask(
     """
     try:
         answer = controller(observation)
+    except CopsenseError as error:  # which says itself what to do
+        raise ControllerError(
+            f"{_when(controller, observation)} found no torques ({type(error).__name__}): {error}"
+        ) from error
     except (Exception, SystemExit) as error:
         raise ControllerError(
-            f"{_when(controller, observation)} raised {type(error).__name__}: {error}. "
-            "Fix the controller for this state."
+            f"{_when(controller, observation)} raised {type(error).__name__}: "
+            f"{str(error).rstrip('.')}. Fix the controller for this state."
         ) from error
     torques: Any = answer.torques if isinstance(answer, Command) else answer
     wrenches = answer.wrenches if isinstance(answer, Command) else None

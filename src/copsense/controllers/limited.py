@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from copsense.controllers.sharing import ShareByCriterion, allowed
+from copsense.controllers.sharing import Choice, ShareByCriterion, allowed
 from copsense.criterion import Criterion
 from copsense.errors import UnsolvedError
 from copsense.limits import Limits, limit_rows
@@ -22,8 +22,9 @@ class ShareWithinLimits:
     """The forces of least cost within limits; near their edge, those that come nearest.
 
     Where the criterion's own choice respects the limits it is taken. Otherwise a quadratic program
-    over the m - 6 free directions is solved; where no forces cause the wanted momentum rate within
-    the limits, the rate yields and the limits hold.
+    over the m - 6 free directions is solved, and one for each tie-break over what is left free;
+    where no forces cause the wanted momentum rate within the limits, the rate yields and the limits
+    hold.
 
     Args:
         stance: robot and contacts.
@@ -36,7 +37,6 @@ class ShareWithinLimits:
         self.criterion = criterion
         self.limits = limits
         self._free = ShareByCriterion(stance, criterion)
-        self._quadratic = criterion.at(stance)
         self._rows = limit_rows(stance, limits)
         self._weight = stance.robot.weight
 
@@ -50,33 +50,46 @@ class ShareWithinLimits:
         forces = self._free.among(problem, forces, Z)
         if self._rows.excess(problem, forces) <= _FEASIBLE * self._weight:
             return forces
-        A, b = self._rows.over_forces(problem)
-        H, g = self._quadratic.over_forces(problem)
-        B, left, slope = problem.base_map, b - A.dot(forces), H.dot(forces) - g
-        # f = forces + Z y has the wanted momentum rate.
+        choices = self._free.choices(problem, Z)
         if Z.shape[1]:  # one foot has no choice
-            y = quick_optimum(Z.T.dot(H).dot(Z), Z.T.dot(slope), A.dot(Z), left, self._weight)
-            if y is not None:
-                return forces + Z.dot(y)
+            # f = forces + Z y has the wanted momentum rate.
+            found = self._least(problem, choices, forces, Z)
+            if found is not None:
+                return found
+        # Where it cannot be had within the limits, it yields; without motors other rows do not.
         if problem.response is not None:
-            return self._yielding(problem.yielding())
-        price = _PRICE * float(np.abs(H).max())
-        # B' (B forces - base_wrench) = 0 adds nothing to the slope.
-        change = quick_optimum(H + price * B.T.dot(B), slope, A, left, self._weight)
-        if change is None:
-            raise UnsolvedError(float(np.max(-left) / self._weight))
-        return forces + change
-
-    def _yielding(self, problem: LoadProblem) -> Float[np.ndarray, " m"]:
-        """The same for a robot whose other rows of the load cannot yield: no motor is there."""
-        A, b = self._rows.over_forces(problem)
-        H, g = self._quadratic.over_forces(problem)
+            problem = problem.yielding()
+            choices = self._free.choices(problem, Z)
+            forces, Z = allowed(problem.base_map[6:], problem.base_wrench[6:])
+        else:
+            Z = np.eye(len(forces))
         B, w = problem.base_map[:6], problem.base_wrench[:6]
-        start, Z = allowed(problem.base_map[6:], problem.base_wrench[6:])
-        price = _PRICE * float(np.abs(H).max())
-        H, g = H + price * B.T.dot(B), g + price * B.T.dot(w)
-        left, slope = b - A.dot(start), H.dot(start) - g
-        change = quick_optimum(Z.T.dot(H).dot(Z), Z.T.dot(slope), A.dot(Z), left, self._weight)
-        if change is None:
-            raise UnsolvedError(float(np.max(-left) / self._weight))
-        return start + Z.dot(change)
+        first = choices[0]
+        price = _PRICE * float(np.abs(first.H).max())
+        dear = Choice(first.H + price * B.T.dot(B), first.g + price * B.T.dot(w), first.free)
+        found = self._least(problem, [dear, *choices[1:]], forces, Z)
+        if found is None:
+            A, b = self._rows.over_forces(problem)
+            raise UnsolvedError(float(np.max(A.dot(forces) - b) / self._weight))
+        return found
+
+    def _least(
+        self,
+        problem: LoadProblem,
+        choices: list[Choice],
+        forces: Float[np.ndarray, " m"],
+        Z: Float[np.ndarray, "m z"],
+    ) -> Float[np.ndarray, " m"] | None:
+        """Of forces + Z y within the limits those of least cost; None where none are found."""
+        A, b = self._rows.over_forces(problem)
+        left = b - A.dot(forces)
+        for choice in choices:
+            flat = Z.T.dot(choice.free) if choice.free.shape[1] else None
+            cost, slope = Z.T.dot(choice.H).dot(Z), Z.T.dot(choice.H.dot(forces) - choice.g)
+            y = quick_optimum(cost, slope, A.dot(Z), left, self._weight, flat)
+            if y is None:
+                return None
+            # Along what is free these are one optimum of many: the next cost starts from it.
+            forces, Z = forces + Z.dot(y), choice.free
+            left = np.maximum(b - A.dot(forces), 0.0)
+        return forces

@@ -17,6 +17,10 @@ _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may
 _ZERO = 1e-12  # norm of a row that limits nothing
 _UNBOUNDED = 1e30  # as the solver writes infinity
 _QUICK = 1e-6  # violation of a condition, relative, that a control loop accepts
+_FLAT = 1e-6  # curvature of a proximal step along flat directions, relative to the cost's largest
+_STEPS = 20  # proximal steps; one to three are usual
+_NOTHING = 1e-9  # of the unit: a slope so small, of a cost whose curvature is 1, is none
+_EXACT = 1e-9  # violation of the cost's own conditions under which no further step is taken
 _PROOF = 1e-10  # what a linear program's solution may leave
 _LINEAR_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the slower solver, in the order tried
 
@@ -43,33 +47,46 @@ def quick_optimum(
     A: Float[np.ndarray, "r z"],
     b: Float[np.ndarray, " r"],
     unit: float,
+    flat: Float[np.ndarray, "z k"] | None = None,
 ) -> Float[np.ndarray, " z"] | None:
     """minimise 1/2 y' H y + h' y subject to A y <= b, for a control loop.
 
     Args:
-        H: positive definite.
-        h: minus the cost's slope at zero.
+        H: positive definite, but along `flat`.
+        h: the cost's slope at zero.
         A: rows.
         b: their bounds.
         unit: the size of y that errors are relative to.
+        flat: orthonormal directions that are to cost nothing, whatever H and h say; None for none.
 
     Returns:
-        The optimum, or None where there is none or none that meets its conditions was found.
+        The optimum, of several one, or None where there is none or none that meets its conditions
+        was found.
     """
-    size = float(np.abs(H).max())
+    size = float(np.abs(H).max()) or 1.0
     length = np.maximum(np.sqrt((A * A).sum(axis=1)), _ZERO)
     rows, bound, H, h = A / length[:, None], b / length, H / size, h / size
-    y, flag, l = dual_active_set(H, h, rows, bound, primal_tol=_FEASIBLE * unit)
-    if flag < 1:
-        return None
-    slope = H.dot(y) + h
-    off = np.abs(slope + l.dot(rows)).max() / max(
-        float(np.abs(slope).max()), float(np.abs(h).max())
-    )
-    over = float((rows.dot(y) - bound).max(initial=0.0))
-    if not (off <= _QUICK and over <= _QUICK * unit and l.min(initial=0.0) >= 0.0):
-        return None
-    return y
+    curved, drawn, best = H, h, None
+    if flat is not None:
+        H, h = H - flat.dot(flat.T.dot(H)), h - flat.dot(flat.T.dot(h))
+        H = H - H.dot(flat).dot(flat.T)
+        curved, drawn = H + _FLAT * flat.dot(flat.T), h
+    for _ in range(1 if flat is None else _STEPS):
+        y, flag, l = dual_active_set(curved, drawn, rows, bound, primal_tol=_FEASIBLE * unit)
+        if flag < 1:
+            break
+        # Of the cost itself: what a proximal step pulls is an error.
+        slope = H.dot(y) + h
+        off = float(np.abs(slope + l.dot(rows)).max()) / max(
+            float(np.abs(slope).max()), float(np.abs(h).max()), _NOTHING * unit
+        )
+        over = float((rows.dot(y) - bound).max(initial=0.0))
+        if off <= _QUICK and over <= _QUICK * unit and l.min(initial=0.0) >= 0.0:
+            best = y
+        if flat is None or off <= _EXACT:
+            break
+        drawn = h - _FLAT * flat.dot(flat.T.dot(y))
+    return best
 
 
 def linear_minimum(
