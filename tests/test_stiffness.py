@@ -9,8 +9,9 @@ from support.servos import ServoRobot
 
 import copsense
 from copsense import Criterion, check_sensitivity, minimum_torque, solve_equilibrium
+from copsense.criterion_text import criterion_from_text
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.stiffness import command_preload, critical_stiffness, stiffness, stiffness_named
+from copsense.stiffness import command_preload, critical_stiffness, stiffness
 from copsense.terms import PreloadTerm, TorqueTerm
 
 GROUPS = "stiffness:hip=4000,ankle=1000,rest=2000"
@@ -141,10 +142,10 @@ def test_soft_soles_make_a_robot_fall_that_stiff_joints_cannot_hold(icub):
 
 
 def test_the_command_line_names_stiffnesses(icub):
-    named = stiffness_named(GROUPS)
+    named = criterion_from_text(GROUPS)
     alike = stiffness({"*hip*": 4000.0, "*ankle*": 1000.0, "*": 2000.0}, name=GROUPS)
     assert named == alike
-    soles = stiffness_named("stiffness:2000,mx=2834,my=709")
+    soles = criterion_from_text("stiffness:2000,mx=2834,my=709")
     expected = stiffness(2000.0, [np.inf, np.inf, np.inf, 2834.0, 709.0, np.inf])
     a, b = (solve_equilibrium(icub, c).forces for c in (soles, expected))
     np.testing.assert_allclose(a, b, rtol=0, atol=1e-9)
@@ -162,7 +163,7 @@ def test_the_command_line_names_stiffnesses(icub):
 )
 def test_texts_that_are_no_stiffness_are_rejected(text):
     with pytest.raises(InvalidInputError, match="stiffness"):
-        stiffness_named(text)
+        criterion_from_text(text)
 
 
 def test_weights_by_pattern_are_said_where_they_overlap_or_fit_nothing(icub):

@@ -14,7 +14,6 @@ To first order in the deflection; the error in the forces goes as 1/K.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -30,14 +29,7 @@ from copsense.stance import Stance, check_at_rest
 from copsense.statics import solve_equilibrium
 from copsense.terms import PreloadTerm, Term, TorqueTerm, WrenchTerm
 
-COMMAND_LINE = "stiffness"
-_SOLE = ("fx", "fy", "fz", "mx", "my", "mz")
 _RIGID = 1e-12  # motions, relative, that no joint feels
-_FORM = (
-    "Give numbers in Nm/rad: 'stiffness:2000' for all joints alike, or by part of the joints' "
-    "names 'stiffness:hip=4000,ankle=1000,rest=2000'; and of soles 'mx=2800,my=700' (Nm/rad) or "
-    "'fz=1e5' (N/m)."
-)
 
 
 def stiffness(
@@ -71,38 +63,6 @@ def stiffness(
     if preload is not None:
         terms.append(PreloadTerm(preload))
     return Criterion(name, tuple(terms))
-
-
-def stiffness_named(text: str) -> Criterion:
-    """The criterion that ``--criterion stiffness:...`` says.
-
-    Args:
-        text: such as ``"stiffness:2000"`` or ``"stiffness:hip=4000,ankle=1000,rest=2000,mx=2800"``.
-
-    Raises:
-        InvalidInputError: it is not of this form.
-    """
-    _, _, listed = text.partition(":")
-    joints: dict[str, float] = {}
-    sole = dict.fromkeys(_SOLE, math.inf)
-    for entry in filter(None, listed.split(",")):
-        key, equals, value = entry.rpartition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            raise InvalidInputError(f"{entry!r} in {text!r} is not a stiffness. {_FORM}") from None
-        key = key.strip() if equals else "rest"
-        pattern = "*" if key == "rest" else key if "*" in key else f"*{key}*"
-        if key in sole:
-            sole[key] = number
-        elif not re.fullmatch(r"[\w.*-]+", key) or pattern in joints:
-            raise InvalidInputError(f"{entry!r} in {text!r} names no joints. {_FORM}")
-        else:
-            joints[pattern] = number
-    if not joints:
-        raise InvalidInputError(f"{text!r} gives no joint a stiffness. {_FORM}")
-    soft = any(map(math.isfinite, sole.values()))
-    return stiffness(joints, list(sole.values()) if soft else None, name=text)
 
 
 def command_preload(stance: Stance, offsets: Mapping[str, float]) -> Float[np.ndarray, "nc 6"]:

@@ -117,3 +117,34 @@ def test_regions_without_end_are_said_to_be_so(tmp_path):
     answer = copsense("analyse", "four_bar", "--limits", "friction=0.5", "--regions", picture)
     assert answer.code == 0
     assert "without end" in answer.out
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--at", "com_y=0.01", "--com-y", "0.01"), "at alone"),
+        (("--at", "com_q=0.01"), "Did you mean com_"),
+        (("--at", "com_y"), "COORDINATE=VALUE"),
+        (("--at", "com_y=2deg"), "Give a length"),
+        (("--at", "com_y=1", "--at", "com_y=2"), "Name each of them once"),
+        (("--at", "com_y=0.5"), "no posture of 'icub' at com_y = 0.5"),
+        (("--criterion", "weighted-torque:hip=-1"), "not positive"),
+        (("--criterion", "weighted:hip=1"), "Did you mean weighted-torque"),
+    ],
+)
+def test_coordinates_and_weights_that_cannot_be_meant_are_rejected(
+    options, words, icub, monkeypatch
+):
+    monkeypatch.setattr("copsense.robots.load_stance", lambda *_, **__: icub)
+    assert words in copsense("analyse", "icub", *options).error
+
+
+def test_coordinates_hold_the_base_where_com_y_alone_lets_it_go(icub, monkeypatch):
+    monkeypatch.setattr("copsense.robots.load_stance", lambda *_, **__: icub)
+    asked = ("--com-y", "10mm", "--com-z", "0.52")
+    held = ("--at", "com_y=10mm", "--at", "com_z=0.52")
+    one, other = (copsense("analyse", "icub", *options, "--json").json for options in (asked, held))
+    for answer in (one, other):
+        assert answer["com"][1:] == pytest.approx([0.01, 0.52], abs=1e-11)
+    torques = [each["criteria"]["minimum-torque"]["torque_norm"] for each in (one, other)]
+    assert abs(torques[0] - torques[1]) > 1e-3

@@ -5,8 +5,9 @@ import pytest
 import zarr
 
 import copsense
-from copsense.maps import Axis, Grid, Marginal, Sample, load_map, marginal, skeleton
+from copsense.maps import Axis, Grid, Marginal, Sample, load_map, marginal
 from copsense.plots import plot_map
+from copsense.skeleton import skeleton
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ from copsense.controllers import BalancingController
 from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
+from copsense.explore import Model, Setting, State
 from copsense.identification import Measurements, identify
 from copsense.labelled import LabelledResult
 from copsense.limits import limit_rows
@@ -98,6 +99,8 @@ def all_results(icub) -> dict[str, object]:
     somewhere = {"com_y": 0.01}
     chart = PostureChart(bar, ["com_y"])
     kernel = BatchKernel(bar, [TORQUE])
+    explored = Model(icub)
+    shown = explored.view(State(limits=copsense.Limits(), overlays=frozenset({"regions"})))
     return {
         "stance": icub,
         "driven stance": driven,
@@ -193,6 +196,8 @@ def all_results(icub) -> dict[str, object]:
             ("minimum-torque",),
             np.zeros((1, 2, 40)),
         ),
+        "state": State(("icub",), {"com_y": Setting(0.01, "m")}, limits=LIMITS),
+        "view": explored.add_regions(shown),
         "case": make_plan(
             [RobotChoice("icub", soles={"l_sole": (-0.1, 0.1, -0.03, 0.03)})],
             [PostureChoice("bent", joints={"l_knee": 0.1})],

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.analysis.asked import asked_posture, determined_criteria
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
@@ -17,12 +18,10 @@ from copsense.arrays import finite_number
 from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
-from copsense.errors import UndeterminedWrenchError
 from copsense.freedom import com_span, freedom_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, optional_limits, torque_placeholders
 from copsense.path import LateralPath
-from copsense.posture import solve_posture
 from copsense.robots import plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance, check_at_rest, check_stance
@@ -30,9 +29,6 @@ from copsense.statics import (
     StaticEquilibrium,
     WrenchPolicy,
     named_criteria,
-    solve_equilibrium,
-    tie_break_note,
-    with_tie_break,
 )
 from copsense.sway_levers import SwayLever, sway_levers
 
@@ -224,7 +220,9 @@ def analyse(
     *,
     com_x: float | None = None,
     com_y: float | None = None,
+    com_z: float | None = None,
     joints: Mapping[str, float] | None = None,
+    at: Mapping[str, float] | None = None,
     check: bool = False,
     period: float | None = None,
 ) -> Analysis:
@@ -239,13 +237,20 @@ def analyse(
         along: a joint per which the sensitivity is given too, along the CoM's lateral path.
         com_x: world x of the CoM to move to first [m]; None holds it.
         com_y: world y likewise [m].
+        com_z: world z to move to [m]; None leaves the height to the posture nearest to the
+            stance.
         joints: joint -> position to hold [rad, or m for a prismatic joint].
+        at: coordinate -> value of the posture instead, by name as in
+            `copsense.batch.PostureChart` [m, rad]: CoM, base, joints and where the feet stand.
+            What is not named keeps the stance's value, where `com_y` alone lets everything give
+            way.
         check: compare the derivatives with finite differences.
         period: of a sideways sway of the CoM about this posture [s]: `Analysis.sway` then says of
             each output what it does to the slope, and up to which frequency statics are within 5 %.
 
     Raises:
         InvalidInputError: not a stance, or criteria without distinct names.
+        InvalidInputError: `at` beside `com_x`, `com_y`, `com_z` or `joints`.
         UnreachablePostureError: no posture has the CoM and the joints there.
         SensitivityMismatchError: the check failed.
         CopsenseError: a criterion has no solution here.
@@ -257,12 +262,8 @@ def analyse(
     chosen = named_criteria(usual if criteria is None else criteria, "an analysis")
     if along is not None:
         stance.robot.velocity_index(along)
-    planar = stance.robot.base_nv != 6
-    x = com_x if com_x is not None or planar else float(stance.com[0])
-    y = float(stance.com[1]) if com_y is None else com_y
-    posture = solve_posture(stance, com=(x, y, None), joints=joints)
-    here, tangent = posture.stance, posture.tangents[:, 0 if x is None else 1]
-    chosen, tied = _determined(here, chosen, within)
+    here, tangent = asked_posture(stance, (com_x, com_y, com_z), joints, at)
+    chosen, tied = determined_criteria(here, chosen, within)
     found = {name: cop_sensitivity(here, c, within) for name, c in chosen.items()}
     if check:
         for criterion in chosen.values():
@@ -291,32 +292,6 @@ def analyse(
         *joint_limit_notes(here),
     )
     return Analysis(here, tangent, found, within, limited, along, notes, check, period, swayed)
-
-
-def _determined(
-    stance: Stance, criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None
-) -> tuple[dict[str, Criterion | WrenchPolicy], list[str]]:
-    """The criteria that can be told here, each with a tie-break where it needs one, and notes."""
-    found: dict[str, Criterion | WrenchPolicy] = {}
-    notes, errors = [], []
-    for name, criterion in criteria.items():
-        found[name] = criterion
-        if not isinstance(criterion, Criterion):
-            continue
-        try:
-            found[name] = tied = with_tie_break(stance, criterion)
-            if tied is not criterion and limits is not None:
-                solve_equilibrium(stance, tied, limits)  # or says why it cannot
-        except UndeterminedWrenchError as error:
-            del found[name]
-            errors.append(error)
-            notes.append(f"{name} is left out: {error}")
-            continue
-        if tied is not criterion:
-            notes.append(tie_break_note(name))
-    if not found:
-        raise errors[0]
-    return found, notes
 
 
 def _limit_notes(

@@ -13,7 +13,7 @@ from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
 from copsense.cli.stance_memory import written
 from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import LENGTH, TIME, read_positions
+from copsense.cli.units import LENGTH, TIME, read_coordinates, read_positions
 from copsense.errors import InvalidInputError
 
 
@@ -22,6 +22,7 @@ from copsense.errors import InvalidInputError
     "  copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png\n"
     "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
     "  copsense analyse icub --period 2s\n"
+    "  copsense analyse icub --at com_y=30mm --at pitch=2deg --at l_sole:x=20mm\n"
     "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
 )
 @stance_options
@@ -30,12 +31,22 @@ from copsense.errors import InvalidInputError
 @click.option(
     "--com-y", type=LENGTH, metavar="LENGTH", help="World y of the CoM; default the middle."
 )
+@click.option("--com-z", type=LENGTH, metavar="LENGTH", help="World z of the CoM; default free.")
 @click.option(
     "--joint",
     "joints",
     multiple=True,
     metavar="JOINT=POSITION",
     help="Hold a joint there: degrees, or metres for a prismatic joint. Repeatable.",
+)
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="COORDINATE=VALUE",
+    help="A coordinate of the posture, instead of --com-x, --com-y, --com-z and --joint: com_x, "
+    "com_y, com_z, base_x, base_y, base_z, roll, pitch, yaw, a joint, CONTACT:x, CONTACT:y or "
+    "CONTACT:yaw (metres, degrees, or with the unit). What is not named keeps the stance's "
+    "value: the base does not give way. Repeatable.",
 )
 @click.option(
     "--along",
@@ -67,7 +78,9 @@ def analyse(
     limits: str | None,
     com_x: float | None,
     com_y: float | None,
+    com_z: float | None,
     joints: tuple[str, ...],
+    at: tuple[str, ...],
     along: str | None,
     period: float | None,
     check: bool,
@@ -107,7 +120,9 @@ def analyse(
         along,
         com_x=com_x,
         com_y=com_y,
+        com_z=com_z,
         joints=read_positions(joints, home.robot),
+        at=read_coordinates(at, home),
         check=check,
         period=period,
     )

@@ -34,7 +34,8 @@ def _options(how_many: str) -> list[Callable[[Any], Any]]:
             multiple=True,
             metavar="NAME",
             help="How the load is shared: minimum-wrench, minimum-torque, limit-weighted-torque, "
-            f"inertia-weighted-torque, minimum-tangential, or of a robot on position servos "
+            "inertia-weighted-torque, minimum-tangential, weighted-torque:hip=2,knee=1,rest=1, or "
+            "of a robot on position servos "
             f"stiffness:hip=4000,ankle=1000,rest=2000 [Nm/rad], soles mx=2800,my=700. {how_many}",
         ),
         click.option(
@@ -68,16 +69,10 @@ def read_criterion(names: tuple[str, ...], characteristic_length: float) -> Crit
 
 def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
     """The criteria named, or the paper's two."""
-    from copsense.criterion import criterion_named
-    from copsense.stiffness import COMMAND_LINE, stiffness_named
+    from copsense.criterion_text import criterion_from_text
 
     file = remembered_stance()
     if not names and file is not None and file.criteria:
         return list(file.criteria)
     chosen = dict.fromkeys(names or ("minimum-wrench", "minimum-torque"))
-    return [
-        stiffness_named(name)
-        if name.partition(":")[0] == COMMAND_LINE
-        else criterion_named(name, characteristic_length)
-        for name in chosen
-    ]
+    return [criterion_from_text(name, characteristic_length) for name in chosen]

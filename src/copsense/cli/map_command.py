@@ -231,8 +231,9 @@ def _draw(
     how: Any,
     force: bool,
 ) -> None:
-    from copsense.maps import load_map, marginal, skeleton, worst_stances
+    from copsense.maps import load_map, marginal, worst_stances
     from copsense.plots import plot_map, save_figure
+    from copsense.skeleton import skeleton
 
     dataset = load_map(summary.path)
     marginals = [

@@ -17,6 +17,7 @@ from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.robot import Robot
+    from copsense.stance import Stance
 
     _ParamType = click.ParamType[Any]
 else:  # not generic in click 8.1
@@ -121,6 +122,27 @@ def read_positions(texts: Iterable[str], robot: Robot) -> dict[str, float]:
     form = "JOINT=POSITION, such as l_knee=-20 (degrees), l_knee=-0.35rad or slide=0.1 (metres)"
     return {
         name: read_quantity(value, robot.joint_unit(name)) for name, value in _pairs(texts, form)
+    }
+
+
+def read_coordinates(texts: Iterable[str], stance: Stance) -> dict[str, float]:
+    """``COORDINATE=VALUE`` options: coordinate of a posture chart -> value [m, rad].
+
+    Raises:
+        UnknownNameError: the stance has no such coordinate.
+        InvalidInputError: not an assignment, a value in a unit that the coordinate has not, or a
+            coordinate that is given twice.
+    """
+    from copsense.batch import PostureChart
+
+    form = "COORDINATE=VALUE, such as com_y=30mm, pitch=2deg, l_knee=-20 or l_sole:x=0.02"
+    pairs = list(_pairs(texts, form))
+    if not pairs:
+        return {}
+    chart = PostureChart(stance, [name for name, _ in pairs], compiled=False)
+    return {
+        name: read_quantity(value, unit)
+        for (name, value), unit in zip(pairs, chart.units, strict=True)
     }
 
 

@@ -13,7 +13,7 @@ from copsense.maps.map_statistics import CriterionSummary, FailedPosture, MapSum
 from copsense.maps.mapping import load_map, map_postures, map_summary
 from copsense.maps.marginals import Marginal, marginal
 from copsense.maps.sampling import Axis, Grid, Sample
-from copsense.maps.skeletons import skeleton, worst_stances
+from copsense.maps.worst_stances import worst_stances
 
 __all__ = [
     "Axis",
@@ -29,6 +29,5 @@ __all__ = [
     "map_postures",
     "map_summary",
     "marginal",
-    "skeleton",
     "worst_stances",
 ]

@@ -42,7 +42,7 @@ def plot_map(
     Args:
         marginals: what `copsense.maps.marginal` gives, of the same map and criteria.
         worst: criterion -> skeletons of its worst postures, the worst first, as
-            `copsense.maps.skeleton` gives them; three are drawn.
+            `copsense.skeleton.skeleton` gives them; three are drawn.
 
     Raises:
         InvalidInputError: there is no marginal, or they have different criteria.

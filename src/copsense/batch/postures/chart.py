@@ -6,7 +6,7 @@ a leg of six joints under a flat foot is a 6 x 6 system of its own. See `Posture
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from functools import partial
@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import whole_number
+from copsense.arrays import finite_number, whole_number
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
@@ -31,7 +31,7 @@ from copsense.batch.postures.reference_search import search_one
 from copsense.batch.postures.search_plan import plan_search
 from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK
 from copsense.batch.workspace import workspace, workspace_offsets
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.stance import Stance
 
 _BLOCK = 512  # postures that a thread takes at a time
@@ -80,8 +80,16 @@ class PostureChart:
         """Robot and coordinates."""
         return f"PostureChart({self.stance.robot.name!r} over {', '.join(self.names)})"
 
-    def __init__(self, stance: Stance, coordinates: Sequence[str]) -> None:
+    def __init__(
+        self, stance: Stance, coordinates: Sequence[str], *, compiled: bool = True
+    ) -> None:
         """Find out what the names mean.
+
+        Args:
+            stance: where the search starts.
+            coordinates: their names.
+            compiled: whether the kernel may serve; False searches one posture at a time, which
+                takes milliseconds for each and waits for no compiler.
 
         Raises:
             InvalidInputError: no name, one twice, or two that contradict each other.
@@ -94,7 +102,7 @@ class PostureChart:
         self.values.flags.writeable = False
         self._joints, self._rows_named = joint_units(stance), row_units(stance, self._coordinates)
         self._code: Callable[..., None] | None = None
-        self.fallback_reason = why_not_covered(stance)
+        self.fallback_reason = why_not_covered(stance) if compiled else "nothing is to be compiled"
         self._whole = solved_whole(stance)
         if not self.fallback_reason and stance.false_motions.shape[1]:
             self.fallback_reason = "the contacts hold a motion to second order only"
@@ -106,6 +114,19 @@ class PostureChart:
             search_plan, search = plan_search(stance, layout, offset, self._coordinates)
             self._given = (*layout.parts, search_plan, offset, search)
             self._size = search.size
+
+    @property
+    def compiled(self) -> bool:
+        """Whether the kernel is compiled: if not, the first search takes some 20 s more.
+
+        True where postures are solved one at a time.
+        """
+        if self.fallback_reason or self._code is not None:
+            return True
+        from copsense.batch.compiler import is_compiled
+        from copsense.batch.postures.newton import solve_postures
+
+        return is_compiled(solve_postures)
 
     def empty(self, count: int) -> PostureBatch:
         """Arrays for `count` postures, to be filled with ``out=``."""
@@ -212,3 +233,32 @@ class PostureChart:
                     f"PostureChart.empty({count})."
                 )
         return out
+
+
+def chart_posture(stance: Stance, at: Mapping[str, float]) -> Stance:
+    """The one posture of a chart at some values, without the compiler.
+
+    Args:
+        stance: what the coordinates not named are kept from.
+        at: coordinate of `PostureChart` -> value [m, rad].
+
+    Raises:
+        UnreachablePostureError: there is none; the message says what remains.
+        InvalidInputError: as `PostureChart`, or a value that is not a number.
+        UnknownNameError: a name that is not a coordinate.
+    """
+    chart = PostureChart(stance, tuple(at), compiled=False)
+    values = [finite_number(value, f"the coordinate {name}") for name, value in at.items()]
+    found = chart.solve([values])
+    if not found.converged[0]:
+        raise unreachable(stance, at, str(found.reasons[0]))
+    return stance.at(found.configurations[0])
+
+
+def unreachable(stance: Stance, at: Mapping[str, float], reason: str) -> UnreachablePostureError:
+    """The error of a chart that has no posture at some values."""
+    asked = ", ".join(f"{name} = {round(value, 6) + 0.0:g}" for name, value in at.items())
+    return UnreachablePostureError(
+        f"no posture of {stance.robot.name!r} at {asked}: {reason.rstrip('.')}. The coordinates "
+        "that are not named keep the stance's values: ask for less, or name fewer."
+    )

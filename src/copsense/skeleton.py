@@ -1,15 +1,11 @@
-"""Skeletons: a posture as lines between its joints, to be drawn; the worst postures of a map."""
+"""Skeleton: a posture as lines between its joints, to be drawn."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.batch import PostureChart
-from copsense.maps.map_statistics import WorstPosture
 from copsense.stance import Stance
 
 
@@ -23,12 +19,3 @@ def skeleton(stance: Stance) -> Float[np.ndarray, "s 2 3"]:
     for contact, place in zip(stance.contacts, stance.placements, strict=True):
         lines.append((origins[stance.robot.frame(contact.frame).parentJoint], place.translation))
     return np.array(lines).reshape(-1, 2, 3)
-
-
-def worst_stances(stance: Stance, worst: Sequence[WorstPosture]) -> list[Stance]:
-    """The stances at a map's worst postures, solved again from their coordinates."""
-    if not worst:
-        return []
-    names = tuple(worst[0].coordinates)
-    values = np.array([[w.coordinates[n] for n in names] for w in worst])
-    return [stance.at(q) for q in PostureChart(stance, names).solve(values).configurations]

@@ -1,0 +1,394 @@
+"""Model: a stance that answers states with views, the quick part first and the rest in stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from copsense.analysis.asked import asked_posture, determined_criteria
+from copsense.analysis.joint_notes import ROUNDING
+from copsense.analysis.limit_analysis import SIDES, analyse_limits
+from copsense.arrays import check_type
+from copsense.batch import PostureChart, coordinate_names
+from copsense.batch.postures.chart import unreachable
+from copsense.content import FrozenMapping
+from copsense.cop import contact_cops
+from copsense.criterion import Criterion, minimum_torque, minimum_wrench
+from copsense.criterion_text import criterion_from_text
+from copsense.design import joint_groups
+from copsense.errors import CopsenseError
+from copsense.explore.state import State
+from copsense.explore.view import (
+    CriterionView,
+    View,
+    criterion_view,
+    posture_notes,
+    posture_parts,
+)
+from copsense.limits import Limits
+from copsense.path import COM_COORDINATES, LateralPath
+from copsense.posture import solve_posture
+from copsense.regions import com_regions
+from copsense.sensitivity import cop_sensitivity
+from copsense.stance import Stance, check_at_rest, check_stance
+from copsense.statics import named_criteria, solve_equilibrium
+
+_CURVE_STEP, _CURVE_REACH = 0.005, 0.12  # m, between the postures of the curve and to either side
+_REGION_TOLERANCE = 1e-3  # m
+_WRONG_SIDE = 2.5  # rad of yaw from which a base looks backwards
+
+Stale = Callable[[], bool]
+Stage = Callable[[View, Stale], View]
+
+
+class Coordinate(NamedTuple):
+    """What a slider moves.
+
+    Attributes:
+        name: as `PostureChart` has it.
+        unit: of its value.
+        home: the stance's own value [m, rad].
+        low: from where on it can be asked for.
+        high: up to where.
+        kind: what it is of.
+        sign: -1 where it is shown with the sign reversed, as roll and pitch of a base that looks
+            backwards.
+    """
+
+    name: str
+    unit: Literal["m", "rad"]
+    home: float
+    low: float
+    high: float
+    kind: Literal["com", "trunk", "joint", "foot"]
+    sign: int = 1
+
+
+class Model:
+    """A stance to explore: `view` answers a state at once, the `stages` add what takes longer.
+
+    It holds no window and starts no thread; numbers are those of `copsense.analyse`, by the same
+    functions.
+
+    Attributes:
+        stance: where every state starts from.
+        words: the words of the command line that say it; see `State`.
+        criteria: what shares the load where a state names none.
+        limits: the limits of the stance file, or None.
+        coordinates: what can be moved, by name.
+        groups: name of each group of joints with a weight of its own -> the joints.
+        compiled: whether charts are served by the compiled kernel; see `use_compiled`.
+    """
+
+    stance: Stance
+    words: tuple[str, ...]
+    criteria: tuple[Criterion, ...]
+    limits: Limits | None
+    coordinates: Mapping[str, Coordinate]
+    groups: Mapping[str, tuple[str, ...]]
+    compiled: bool
+
+    def __init__(
+        self,
+        stance: Stance,
+        words: Sequence[str] = (),
+        *,
+        criteria: Sequence[Criterion] | None = None,
+        limits: Limits | None = None,
+    ) -> None:
+        """Lay out what can be moved.
+
+        Args:
+            stance: the robot on its contacts, at rest.
+            words: the words that tell the command line so; the robot's name where none are given.
+            criteria: what shares the load where a state names none; default the paper's two.
+            limits: what ``"own"`` means in a state.
+
+        Raises:
+            InvalidInputError: not a stance at rest, or criteria of one name.
+        """
+        check_stance(stance)
+        check_at_rest(stance, "an explorer")
+        self.stance = stance
+        self.words = tuple(words) or (stance.robot.name,)
+        usual = (minimum_wrench(1.0), minimum_torque())
+        self.criteria = tuple(usual if criteria is None else criteria)
+        named_criteria(self.criteria, "an explorer", policies=False)
+        if limits is not None:
+            check_type(limits, Limits, "limits", "Give copsense.Limits(...).")
+        self.limits = limits
+        self.coordinates = FrozenMapping({c.name: c for c in _coordinates(stance)})
+        self.groups = FrozenMapping(joint_groups(stance))
+        self.compiled = PostureChart(stance, ("com_y",)).compiled
+        self._charts: dict[tuple[tuple[str, ...], bool], PostureChart] = {}
+        self._criteria = lru_cache(maxsize=32)(self._read_criteria)
+        self._curves: dict[State, tuple[np.ndarray, np.ndarray]] = {}
+
+    def __repr__(self) -> str:
+        """The robot."""
+        return f"Model({self.stance.robot.name!r}, {len(self.coordinates)} coordinates)"
+
+    @property
+    def start(self) -> State:
+        """The state of the stance itself, with what is asked for by default."""
+        return State(self.words)
+
+    def use_compiled(self) -> None:
+        """Compile what charts need, 20 s once on a machine, and use it from then on."""
+        chart = PostureChart(self.stance, ("com_y",))
+        chart.solve([chart.values])
+        self.compiled = True
+
+    def criteria_of(self, state: State) -> dict[str, Criterion]:
+        """The criteria of a state, by name.
+
+        Raises:
+            CopsenseError: one that is not understood or does not fit.
+        """
+        return self._criteria(state.criteria, state.length)
+
+    def limits_of(self, state: State) -> Limits | None:
+        """The limits of a state."""
+        return self.limits if isinstance(state.limits, str) else state.limits
+
+    def posture(self, state: State) -> Stance:
+        """The posture of a state: that of ``copsense.analyse`` for its command.
+
+        Raises:
+            CopsenseError: there is none; the message says why.
+        """
+        if state.at and self.compiled:
+            chart = self._chart(tuple(state.at))
+            found = chart.solve([list(state.at.values())])
+            if not found.converged[0]:
+                raise unreachable(self.stance, state.at, str(found.reasons[0]))
+            stance = self.stance.at(found.configurations[0])
+            return asked_posture(stance, (None, None, None), None, None)[0]
+        joints = {} if state.at else state.joints
+        com = (None, None, None) if state.at else state.com
+        return asked_posture(self.stance, com, joints, state.at)[0]
+
+    def view(self, state: State, revision: int = 0, last: View | None = None) -> View:
+        """What a state looks like, all but what the `stages` add.
+
+        Args:
+            state: what is asked for.
+            revision: number of the request.
+            last: what is shown where the state has no posture; default the stance itself.
+        """
+        try:
+            here = self.posture(state)
+            return self._view(here, state, revision)
+        except CopsenseError as error:
+            if last is None:
+                if not state.coordinates:
+                    # Nothing but the criteria can have failed: show the robot without them.
+                    parts = posture_parts(self.stance)
+                    return View(state, revision, criteria={}, reason=str(error), **parts)
+                last = self.view(replace(state, coordinates={}), revision)
+            return replace(last, state=state, revision=revision, reason=str(error))
+
+    def _view(self, here: Stance, state: State, revision: int) -> View:
+        limits = self.limits_of(state)
+        chosen, notes = determined_criteria(here, self.criteria_of(state), limits)
+        said: dict[str, CriterionView] = {}
+        for name, criterion in chosen.items():
+            said[name] = criterion_view(name, cop_sensitivity(here, criterion, limits), limits)
+        notes = [*notes, *posture_notes(here)]
+        return View(state, revision, criteria=said, notes=tuple(notes), **posture_parts(here))
+
+    @property
+    def stages(self) -> tuple[tuple[float, Stage], ...]:
+        """Seconds of rest after which each is worth its time, and what adds it to a view."""
+        return (0.0, self.add_curve), (0.12, self.add_regions), (0.5, self.add_binding)
+
+    def add_curve(self, view: View, stale: Stale = lambda: False) -> View:
+        """The view with the margins along the lateral path through it.
+
+        The path holds what the state holds, but the CoM's y.
+        """
+        if view.reason or "curve" not in view.state.overlays:
+            return view
+        asked = {n: s for n, s in view.state.coordinates.items() if n != "com_y"}
+        key = replace(view.state, coordinates=asked, overlays=frozenset())
+        if key not in self._curves:
+            found: dict[float, list[float]] = {}
+            names, limits = self.criteria_of(view.state), self.limits_of(view.state)
+            for y, here in self._lateral(key):
+                if stale():
+                    return view
+                found[y] = [_least_margin(here, c, limits) for c in names.values()]
+            if not found:
+                return view
+            ys = np.array(sorted(found))
+            self._curves = {key: (ys, np.array([found[y] for y in ys]).T)}  # the last one is enough
+        known, margins = self._curves[key]
+        return replace(view, curve_y=known, curve_margin=margins)
+
+    def _lateral(self, key: State) -> Iterator[tuple[float, Stance]]:
+        """Postures along the lateral path of a state, from the middle outwards."""
+        middle = float(self.stance.com[1])
+        count = round(_CURVE_REACH / _CURVE_STEP)
+        for side in (1, -1):
+            here = self.stance
+            for i in range(0 if side == 1 else 1, count + 1):
+                y = middle + side * i * _CURVE_STEP
+                try:
+                    if key.held:
+                        here = self.posture(key.named("com_y", y, "m"))
+                    else:
+                        x, _, z = key.com
+                        if x is None and self.stance.robot.base_nv == 6:
+                            x = float(self.stance.com[0])
+                        here = solve_posture(
+                            here, com=(x, y, z), joints=key.joints, reference=self.stance.q
+                        ).stance
+                except CopsenseError:
+                    break
+                yield y, here
+
+    def add_regions(self, view: View, stale: Stale = lambda: False) -> View:
+        """The view with the regions of the CoM, the joints held; without limits, of the soles."""
+        if view.reason or "regions" not in view.state.overlays:
+            return view
+        here = self.stance.at(view.q)
+        limits = self.limits_of(view.state) or Limits()
+        chosen, _ = determined_criteria(here, self.criteria_of(view.state), None)
+        criteria = [c for c in chosen.values() if isinstance(c, Criterion)]
+        if stale():
+            return view
+        try:
+            found = com_regions(here, criteria, limits, tolerance=_REGION_TOLERANCE)
+        except CopsenseError as error:
+            notes = (*view.notes, f"no regions of the CoM: {error}")
+            return replace(view, regions={}, notes=notes)
+        return replace(view, regions={n: r.polygon for n, r in found.items() if len(r.polygon)})
+
+    def add_binding(self, view: View, stale: Stale = lambda: False) -> View:
+        """The view with what is met first on the way to either side, where there are limits."""
+        limits = self.limits_of(view.state)
+        if view.reason or limits is None or not limits.any:
+            return view
+        here, tangent = asked_posture(self.stance.at(view.q), (None, None, None), None, None)
+        chosen, _ = determined_criteria(here, self.criteria_of(view.state), limits)
+        path, lines = LateralPath(here), []
+        for name, criterion in chosen.items():
+            if stale():
+                return view
+            assert isinstance(criterion, Criterion)
+            try:
+                found = cop_sensitivity(here, criterion, limits)
+                analysis = analyse_limits(path, criterion, limits, found, tangent)
+            except CopsenseError as error:
+                lines.append(f"{name}: {error}")
+                continue
+            for side in SIDES:
+                met = [t for t in analysis.travels[side].limits if t.exact is not None]
+                lines.append(
+                    f"{name}, CoM to {side}: {met[0].name} after {1e3 * met[0].exact:.1f} mm"  # type: ignore[operator]
+                    if met
+                    else f"{name}, CoM to {side}: no limit within reach"
+                )
+        return replace(view, binding=tuple(lines))
+
+    def reach(self, state: State, name: str, stale: Stale = lambda: False) -> tuple[float, float]:
+        """From where to where one coordinate of a state can go, the others as they are [m, rad].
+
+        It ends where there is no posture, or where a joint meets its limit. Every tenth of the way
+        to the coordinate's own ends is tried, then the last is halved.
+        """
+        coordinate = self.coordinates[name]
+        ends = []
+        for end in (coordinate.low, coordinate.high):
+            good, bad = 0.0, None
+            for share in np.linspace(0.1, 1.0, 10):
+                if stale():
+                    return coordinate.low, coordinate.high
+                if not self._reaches(state, coordinate, end, float(share)):
+                    bad = float(share)
+                    break
+                good = float(share)
+            for _ in range(3 if bad is not None else 0):
+                assert bad is not None
+                middle = 0.5 * (good + bad)
+                if self._reaches(state, coordinate, end, middle):
+                    good = middle
+                else:
+                    bad = middle
+            ends.append(coordinate.home + good * (end - coordinate.home))
+        return ends[0], ends[1]
+
+    def _reaches(self, state: State, coordinate: Coordinate, end: float, share: float) -> bool:
+        value = coordinate.home + share * (end - coordinate.home)
+        try:
+            here = self.posture(state.named(coordinate.name, value, coordinate.unit))
+        except CopsenseError:
+            return False
+        # What the stance itself is beyond, it may stay beyond.
+        return bool(np.all(here.joint_limit_excess <= self.stance.joint_limit_excess + ROUNDING))
+
+    def _chart(self, names: tuple[str, ...]) -> PostureChart:
+        key = names, self.compiled
+        if key not in self._charts:
+            self._charts[key] = PostureChart(self.stance, names, compiled=self.compiled)
+        return self._charts[key]
+
+    def _read_criteria(self, texts: tuple[str, ...], length: float) -> dict[str, Criterion]:
+        if not texts:
+            return {c.name: c for c in self.criteria}
+        found = [criterion_from_text(text, length) for text in texts]
+        for criterion in found:
+            criterion.at(self.stance)  # weights that do not fit are an error
+        return dict(named_criteria(found, "an explorer", policies=False))
+
+
+def _least_margin(stance: Stance, criterion: Criterion, limits: Limits | None) -> float:
+    """The least margin of any contact with a sole [m]; NaN where there is none."""
+    try:
+        chosen, _ = determined_criteria(stance, {criterion.name: criterion}, limits)
+        cops = contact_cops(solve_equilibrium(stance, chosen[criterion.name], limits))
+    except (CopsenseError, KeyError):
+        return np.nan
+    margins = [
+        float(contact.sole.margins(cop))
+        for contact, cop in zip(stance.contacts, cops, strict=True)
+        if contact.sole is not None
+    ]
+    return min(margins, default=np.nan)
+
+
+def _coordinates(stance: Stance) -> Iterator[Coordinate]:
+    """What can be moved, with generous ends."""
+    robot = stance.robot
+    names = coordinate_names(stance)
+    size = float(stance.com[2]) - min(float(p.translation[2]) for p in stance.placements)
+    backwards = False
+    if robot.base_nv == 6:
+        rotation = pin.Quaternion(np.array(stance.q[3:7])).matrix()
+        backwards = abs(float(pin.rpy.matrixToRpy(rotation)[2])) > _WRONG_SIDE
+    lower, upper = robot.position_limits
+    for name in names:
+        if (name == "com_x" and robot.base_nv != 6) or name.startswith("base_"):
+            continue
+        chart = PostureChart(stance, (name,), compiled=False)
+        unit, home = chart.units[0], float(chart.values[0])
+        if name in COM_COORDINATES:
+            yield Coordinate(name, unit, home, home - 0.4 * size, home + 0.4 * size, "com")
+        elif name in ("roll", "pitch", "yaw"):
+            sign = -1 if backwards and name != "yaw" else 1
+            yield Coordinate(name, unit, home, home - 0.7, home + 0.7, "trunk", sign)
+        elif ":" in name:
+            way = 0.7 if unit == "rad" else 0.4 * size
+            yield Coordinate(name, unit, home, home - way, home + way, "foot")
+        else:
+            i = robot.velocity_index(name) - robot.base_nv
+            low, high = float(lower[i]), float(upper[i])
+            way = np.pi if unit == "rad" else size
+            low = max(low, home - way) if np.isfinite(low) else home - way
+            high = min(high, home + way) if np.isfinite(high) else home + way
+            yield Coordinate(name, unit, home, min(low, home), max(high, home), "joint")
