@@ -23,6 +23,10 @@ EXTRA_OF = {
     "pyarrow": "logs",
     "rosbags": "logs",
     "ezc3d": "logs",
+    "viser": "explore",
+    "trimesh": "explore",
+    "collada": "explore",
+    "fast_simplification": "explore",
 }
 
 

@@ -16,6 +16,7 @@ from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
 from copsense.explore import Model, Setting, State
+from copsense.explore.shape import JointMesh
 from copsense.identification import Measurements, identify
 from copsense.labelled import LabelledResult
 from copsense.limits import limit_rows
@@ -197,6 +198,7 @@ def all_results(icub) -> dict[str, object]:
             np.zeros((1, 2, 40)),
         ),
         "state": State(("icub",), {"com_y": Setting(0.01, "m")}, limits=LIMITS),
+        "mesh": JointMesh(1, np.zeros((3, 3)), np.arange(3)[None]),
         "view": explored.add_regions(shown),
         "case": make_plan(
             [RobotChoice("icub", soles={"l_sole": (-0.1, 0.1, -0.03, 0.03)})],

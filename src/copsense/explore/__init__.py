@@ -7,6 +7,6 @@ explore`` shows them in the browser (`copsense.explore.server`, the extra ``expl
 
 from copsense.explore.model import Coordinate, Model
 from copsense.explore.state import Setting, State
-from copsense.explore.view import CriterionView, View
+from copsense.explore.view import CriterionView, RegionView, View
 
-__all__ = ["Coordinate", "CriterionView", "Model", "Setting", "State", "View"]
+__all__ = ["Coordinate", "CriterionView", "Model", "RegionView", "Setting", "State", "View"]

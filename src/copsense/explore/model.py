@@ -24,7 +24,7 @@ from copsense.design import joint_groups
 from copsense.errors import CopsenseError
 from copsense.explore.state import State
 from copsense.explore.view import (
-    CriterionView,
+    RegionView,
     View,
     criterion_view,
     posture_notes,
@@ -189,16 +189,17 @@ class Model:
                 if not state.coordinates:
                     # Nothing but the criteria can have failed: show the robot without them.
                     parts = posture_parts(self.stance)
-                    return View(state, revision, criteria={}, reason=str(error), **parts)
+                    return View(state, revision, criteria=(), reason=str(error), **parts)
                 last = self.view(replace(state, coordinates={}), revision)
             return replace(last, state=state, revision=revision, reason=str(error))
 
     def _view(self, here: Stance, state: State, revision: int) -> View:
         limits = self.limits_of(state)
         chosen, notes = determined_criteria(here, self.criteria_of(state), limits)
-        said: dict[str, CriterionView] = {}
-        for name, criterion in chosen.items():
-            said[name] = criterion_view(name, cop_sensitivity(here, criterion, limits), limits)
+        said = tuple(
+            criterion_view(name, cop_sensitivity(here, criterion, limits), limits)
+            for name, criterion in chosen.items()
+        )
         notes = [*notes, *posture_notes(here)]
         return View(state, revision, criteria=said, notes=tuple(notes), **posture_parts(here))
 
@@ -266,8 +267,9 @@ class Model:
             found = com_regions(here, criteria, limits, tolerance=_REGION_TOLERANCE)
         except CopsenseError as error:
             notes = (*view.notes, f"no regions of the CoM: {error}")
-            return replace(view, regions={}, notes=notes)
-        return replace(view, regions={n: r.polygon for n, r in found.items() if len(r.polygon)})
+            return replace(view, regions=(), notes=notes)
+        regions = [RegionView(n, r.polygon) for n, r in found.items() if len(r.polygon)]
+        return replace(view, regions=tuple(regions))
 
     def add_binding(self, view: View, stale: Stale = lambda: False) -> View:
         """The view with what is met first on the way to either side, where there are limits."""

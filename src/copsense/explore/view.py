@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,7 +38,7 @@ class CriterionView(ShortRepr):
         unloading_travel: until it carries nothing [m].
         gain: d CoP_y / d CoM_y, contact axes.
         torques: joint torques [N m, or N].
-        effort: |torque| as a share of the model's effort limit; NaN where it gives none.
+        effort: the torques' sizes as shares of the model's effort limits; NaN where it gives none.
         active: limits that hold with equality; empty without limits.
         nearest: the limit with the smallest margin of its unit, as words; empty without limits.
     """
@@ -69,6 +68,23 @@ _WORDS = ("name", "margin_side", "active", "nearest")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class RegionView(ShortRepr):
+    """A region of the CoM.
+
+    Attributes:
+        name: what leaves it.
+        corners: world x and y [m].
+    """
+
+    name: str
+    corners: Float[np.ndarray, "k 2"]
+
+    def __post_init__(self) -> None:
+        """Own the corners."""
+        freeze(self, "corners")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class View(ShortRepr):
     """What is shown of one state: plain data, without a window to show it in.
 
@@ -84,13 +100,12 @@ class View(ShortRepr):
         placements: of each contact in the world, as `poses`.
         soles: outline of each sole in the world [m]; no corner without a sole.
         torque_names: of the torques.
-        criteria: what each criterion says, by its name.
+        criteria: what each criterion says.
         notes: joints beyond their limits, criteria that are left out, and why.
         reason: why the state has no posture; the rest is then the last view that had one.
         curve_y: world y of the CoM along the lateral path [m]; empty until it is known.
         curve_margin: least margin of any contact there, criterion by criterion [m].
-        regions: name -> corners of a region of the CoM, world x and y [m]; None until they are
-            known.
+        regions: of the CoM; None until they are known.
         binding: what is met first on the way to either side within limits, a line each; None until
             it is known.
     """
@@ -106,20 +121,25 @@ class View(ShortRepr):
     placements: Float[np.ndarray, "nc 7"]
     soles: tuple[np.ndarray, ...]
     torque_names: tuple[str, ...]
-    criteria: Mapping[str, CriterionView]
+    criteria: tuple[CriterionView, ...]
     notes: tuple[str, ...] = ()
     reason: str = ""
     curve_y: Float[np.ndarray, " m"] = field(default_factory=lambda: np.zeros(0))
     curve_margin: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
-    regions: Mapping[str, np.ndarray] | None = None
+    regions: tuple[RegionView, ...] | None = None
     binding: tuple[str, ...] | None = None
 
     def __post_init__(self) -> None:
-        """Own arrays and mappings."""
+        """Own the arrays."""
         arrays = ("q", "com", "poses", "bones", "placements", "soles", "curve_y", "curve_margin")
-        freeze(self, *arrays, "criteria")
-        if self.regions is not None:
-            freeze(self, "regions")
+        freeze(self, *arrays)
+
+    def __getitem__(self, name: str) -> CriterionView:
+        """What the criterion of that name says."""
+        for each in self.criteria:
+            if each.name == name:
+                return each
+        raise KeyError(name)
 
     @property
     def ground(self) -> float:
@@ -138,7 +158,7 @@ class View(ShortRepr):
                 _margin_text(float(c.margin[k]), c.margin_side[k]),
                 _first_event(float(c.com_travel[k]), float(c.unloading_travel[k]), self._span),
             )
-            for c in self.criteria.values()
+            for c in self.criteria
             for k, contact in enumerate(self.contacts)
         ]
 
@@ -151,7 +171,7 @@ class View(ShortRepr):
     def verdict(self) -> str:
         """What gives way first under the criterion that lasts longest, and under the others."""
         found = []
-        for c in self.criteria.values():
+        for c in self.criteria:
             travel = np.minimum(c.com_travel, c.unloading_travel)
             k = int(np.argmin(travel))
             word = "tips" if c.com_travel[k] <= c.unloading_travel[k] else "unloads"
