@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from jaxtyping import TypeCheckError
+from jaxtyping import Float, TypeCheckError
 from support import shape_checks
 
 import copsense
@@ -17,6 +17,16 @@ def test_a_wrong_shape_is_caught(icub):
     # A name stands for one number wherever it appears: n torques, nv = n + 6 velocities.
     with pytest.raises(TypeCheckError):
         copsense.PosturePath((icub,), "index", "1", np.zeros(2), np.zeros((1, 29)))
+
+
+def test_a_wrong_shape_is_caught_in_the_answer_too():
+    @shape_checks.checked
+    def shorter(x: Float[np.ndarray, "n"], by: "int") -> "Float[np.ndarray, 'n']":
+        return x[by:]
+
+    assert len(shorter(np.zeros(3), 0)) == 3
+    with pytest.raises(TypeCheckError, match="return"):
+        shorter(np.zeros(3), 1)
 
 
 def test_the_first_calls_of_a_test_are_checked_and_some_of_the_later(icub):

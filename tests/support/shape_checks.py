@@ -9,8 +9,9 @@ import dataclasses
 import inspect
 from collections import defaultdict
 from collections.abc import Sequence
-from functools import wraps
-from typing import Any, get_args, get_origin
+from functools import partial, wraps
+from types import FunctionType, SimpleNamespace
+from typing import Any, get_args, get_origin, get_type_hints
 
 import jaxtyping
 from beartype import BeartypeConf, FrozenDict, beartype
@@ -26,6 +27,7 @@ _SEQUENCES = [
 check = beartype(
     conf=BeartypeConf(
         is_pep484_tower=True,  # an int serves as a float
+        violation_type=jaxtyping.TypeCheckError,
         hint_overrides=FrozenDict(dict.fromkeys(_SEQUENCES, Sequence[Any])),
     )
 )
@@ -62,10 +64,37 @@ def checked(it):
         if number > FIRST and number % EVERY:
             return it(*arguments, **named)
         if checking is None:
-            checking = _jaxtyped(it, typechecker=check)
-        return checking(*arguments, **named)
+            checking = check(_with_known_hints(it))
+        with _sizes():
+            return checking(*arguments, **named)
 
     return call
 
 
-_jaxtyped = jaxtyping.jaxtyped  # the true one
+# Within it a letter is one number, in all arguments and the answer. Jaxtyping's own decorator
+# binds the arguments besides and checks each twice: as much work again.
+_sizes = partial(jaxtyping.jaxtyped, "context")
+
+
+def _with_known_hints(it):
+    """A copy whose annotations are read: Any, where one names what type checkers alone import."""
+    hints = _hints.get(it.__code__)
+    if hints is None:
+        hints = {name: _known(hint, it.__globals__) for name, hint in it.__annotations__.items()}
+        if inspect.isgeneratorfunction(it):  # it yields when its call is over
+            hints.pop("return", None)
+        _hints[it.__code__] = hints
+    copy = FunctionType(it.__code__, it.__globals__, it.__name__, it.__defaults__, it.__closure__)
+    copy.__kwdefaults__, copy.__annotations__ = it.__kwdefaults__, hints
+    copy.__module__, copy.__qualname__ = it.__module__, it.__qualname__
+    return copy
+
+
+def _known(hint, namespace):
+    try:
+        return get_type_hints(SimpleNamespace(__annotations__={"x": hint}), namespace)["x"]
+    except NameError:
+        return Any
+
+
+_hints = {}  # by code
