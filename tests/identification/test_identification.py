@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from support.commands import copsense as command
-from support.public_log import public_log
 
 import copsense
 from copsense import minimum_torque, weighted_torque
@@ -179,16 +177,3 @@ def test_questions_without_an_answer_are_rejected(rows, icub):
     values = np.random.default_rng(0).standard_normal((len(rows), 1))
     with pytest.raises(UnknownNameError, match="weights"):
         identify(Measurements(rows, SHARE, values), ["weights"])
-
-
-def test_a_real_icub_weighs_hips_and_ankles_alike_in_motion():
-    file, robot = public_log()
-    answer = command(
-        "identify", file, "--robot", robot, "--family", "joints", "--postures", "200", "--json"
-    )
-    assert answer.code == 0
-    hip = answer.json["fits"]["joints"]["parameters"]["hip_weight"]
-    # Published beside the data: 1.10 [0.98, 1.23].
-    assert hip["value"] == pytest.approx(1.10, abs=0.05)
-    assert (hip["low"], hip["high"]) == pytest.approx((0.98, 1.23), abs=0.06)
-    assert answer.json["fits"]["joints"]["parameters"]["knee_weight"]["state"] == "not identified"

@@ -4,8 +4,9 @@ from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 
-from copsense.paper.report import report_figures, report_folder
+from copsense.paper.report import report_figures, report_files
 from copsense.paper.reproduce import reproduce_paper
+from copsense.reports import report_folder
 
 POSTURES = 21
 
@@ -21,6 +22,6 @@ def blank_pictures(monkeypatch):
     def figures(reproduction):
         return [replace(figure, draw=SimpleNamespace) for figure in report_figures(reproduction)]
 
-    monkeypatch.setattr(report_folder, "report_figures", figures)
+    monkeypatch.setattr(report_files, "report_figures", figures)
     monkeypatch.setattr(report_folder, "lay_out", lambda figure: None)
     monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+
 import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
@@ -14,6 +17,7 @@ from copsense.errors import InvalidInputError
 @click.command(
     epilog="\b\nExamples:\n"
     "  copsense log com-sinusoid.mat --robot icub.urdf --plot log.png\n"
+    "  copsense log com-sinusoid.mat --robot icub.urdf --report swaying\n"
     "  copsense log walk.mcap --robot g1 --map g1.toml --contact left_ankle_roll_link "
     "--contact right_ankle_roll_link --json\n"
     "  copsense log run.csv --robot icub --save-map run.toml"
@@ -48,7 +52,13 @@ from copsense.errors import InvalidInputError
     help="How many rows are evaluated at most, evenly chosen.",
 )
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
-@click.option("--force", is_flag=True, help="Overwrite the picture and the mapping.")
+@click.option(
+    "--report",
+    type=click.Path(),
+    metavar="FOLDER",
+    help="Write a page on it, report.html, with its figures and data, into a folder.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the picture, the mapping and the report.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def log(
     file: str,
@@ -64,6 +74,7 @@ def log(
     rate: str | None,
     postures: int,
     picture: str | None,
+    report: str | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -84,6 +95,11 @@ def log(
             check_output(path, suffixes=suffixes, overwrite=force)
     if map_file is not None and save_map is not None:
         raise InvalidInputError("--map and --save-map both say what is mapped. Give one.")
+    if report is not None:
+        from copsense.log_report import write_log_report
+        from copsense.reports import check_report_folder
+
+        check_report_folder(report, overwrite=force)
     after = read_quantity(skip, "s")
     hertz = None if rate is None else read_quantity(rate, "Hz")
     chosen = read_criteria(criteria, characteristic_length)
@@ -109,12 +125,17 @@ def log(
         from copsense.plots import save_figure
 
         save_figure(comparison.plot(), picture, overwrite=force)
+    page = None
+    if report is not None:
+        command = f"copsense {shlex.join(sys.argv[1:])}"
+        page = str(write_log_report(comparison, report, overwrite=force, command=command))
     if as_json:
-        written = {k: v for k, v in (("plot", picture), ("map", save_map)) if v is not None}
+        places = (("plot", picture), ("map", save_map), ("report", page))
+        written = {k: v for k, v in places if v is not None}
         echo_json(comparison.to_dict() | written)
         return
     click.echo(str(comparison))
     for finding in comparison.findings:
         click.echo(f"found: {finding.message}")
     echo_notes(comparison.notes)
-    echo_written(picture, save_map)
+    echo_written(picture, save_map, page)

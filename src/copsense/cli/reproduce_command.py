@@ -9,9 +9,14 @@ import sys
 import click
 
 from copsense.cli.limit_options import limits_option, read_limits
+from copsense.errors import InvalidInputError
 
 
-@click.command(epilog="Example: copsense reproduce --output reproduction")
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  copsense reproduce --output reproduction\n"
+    "  copsense reproduce --log com-sinusoid.mat --log-robot model.urdf"
+)
 @click.option(
     "--output",
     type=click.Path(),
@@ -27,21 +32,39 @@ from copsense.cli.limit_options import limits_option, read_limits
     help="Postures of the iCub's lateral sweep.",
 )
 @click.option("--static", is_flag=True, help="Leave the closed loop in MuJoCo out.")
+@click.option(
+    "--log",
+    "log_file",
+    type=click.Path(),
+    metavar="FILE",
+    help="A real robot's log for Section V, such as the public one that docs/logs.md names.",
+)
+@click.option("--log-robot", metavar="ROBOT", help="Whose log it is: a URDF, MJCF, SDF or preset.")
 @limits_option
 @click.option("--force", is_flag=True, help="Overwrite an earlier reproduction.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def reproduce(
-    output: str, postures: int, static: bool, limits: str | None, force: bool, quiet: bool
+    output: str,
+    postures: int,
+    static: bool,
+    log_file: str | None,
+    log_robot: str | None,
+    limits: str | None,
+    force: bool,
+    quiet: bool,
 ) -> None:
     """Reproduce [Romano2016] on the four-bar and on the iCub, statically and in closed loop.
 
     Every claim of the paper is tested (holds, holds if, does not hold), every figure drawn, and one
-    self-contained HTML report written. The last line printed is its path. Limits are those of the
-    report's section on them; by default, what public configurations for this robot use.
+    self-contained HTML report written. With --log, a real robot's own log is put beside Section V.
+    The last line printed is the report's path. Limits are those of the report's section on them; by
+    default, what public configurations for this robot use.
     """
     from copsense.paper.report import check_report_folder, write_report
     from copsense.paper.reproduce import LIMITS, SWAY_FREQUENCY, reproduce_paper
 
+    if (log_file is None) != (log_robot is None):
+        raise InvalidInputError("--log and --log-robot belong together. Give both or neither.")
     check_report_folder(output, overwrite=force)
     within = read_limits(limits) or LIMITS
     if not static and importlib.util.find_spec("mujoco") is None:
@@ -71,6 +94,7 @@ def reproduce(
             postures=postures,
             limits=within,
             sway_frequency=None if static else SWAY_FREQUENCY,
+            real_log=None if log_file is None or log_robot is None else (log_file, log_robot),
             progress=show,
         )
         path = write_report(result, output, overwrite=force, command=command)

@@ -177,7 +177,7 @@ class LogComparison:
 
     def lines(self) -> list[str]:
         """Tables of the slopes of the load, and of the CoPs that move with the sway."""
-        return self._table(self._moving())
+        return self._table(self.shown_slopes)
 
     def _table(self, slopes: Mapping[str, Mapping[str, SlopeEstimate]]) -> list[str]:
         if not slopes:
@@ -191,14 +191,15 @@ class LogComparison:
             lines.append(f"  {unit:<{width + 2}}   slope   95 % interval    phase   error rms")
             for source, slope in of.items():
                 phase = "" if math.isnan(slope.phase) else f"{math.degrees(slope.phase):+6.1f} deg"
-                error = self._error(output, source)
+                error = self.error_text(output, source)
                 lines.append(
                     f"    {source:<{width}} {slope.value:8.3f}   "
                     f"[{slope.low:.3f}, {slope.high:.3f}] {phase:>11}   {error}"
                 )
         return lines
 
-    def _moving(self) -> dict[str, Mapping[str, SlopeEstimate]]:
+    @property
+    def shown_slopes(self) -> dict[str, Mapping[str, SlopeEstimate]]:
         """The slopes, those of CoPs along one axis of the contacts: where they are largest."""
         of_cops = {k: v for k, v in self.slopes.items() if k != "load"}
         size = {
@@ -211,7 +212,8 @@ class LogComparison:
         axis = max(size, key=size.__getitem__)
         return {k: v for k, v in self.slopes.items() if k == "load" or k[4] == axis}
 
-    def _error(self, output: str, source: str) -> str:
+    def error_text(self, output: str, source: str) -> str:
+        """The error of a source's prediction of an output, as the table has it; may be empty."""
         if source == MEASURED:
             return ""
         found = self.errors(next(s for s in self.statics if s.name == source))

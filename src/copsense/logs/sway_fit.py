@@ -66,6 +66,12 @@ class SlopeEstimate:
         """Value and interval."""
         return f"{type(self).__name__}({self.value:.4g} [{self.low:.4g}, {self.high:.4g}])"
 
+    def place_of(self, other: SlopeEstimate) -> Literal["inside", "on the edge", "outside"]:
+        """Where another slope lies against this interval: on the edge if only intervals meet."""
+        if self.low <= other.value <= self.high:
+            return "inside"
+        return "on the edge" if other.low <= self.high and other.high >= self.low else "outside"
+
     def to_dict(self) -> dict[str, float | int]:
         """Plain data, the phase in degrees too."""
         return {

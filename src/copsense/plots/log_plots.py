@@ -1,4 +1,7 @@
-"""plot_log: a robot's log beside what criteria say, after [Romano2016] Figures 6 to 9."""
+"""plot_log: a robot's log beside what criteria say, after [Romano2016] Figures 6 to 9.
+
+Black is what was measured, a colour a criterion: dotted at rest, solid in motion.
+"""
 
 from __future__ import annotations
 
@@ -10,14 +13,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.plots.reading import MM
-from copsense.plots.style import INK, MUTED, colours, line_styles, new_figure, put_legend, styled
+from copsense.plots.reading import DEG, MM
+from copsense.plots.style import (
+    INK,
+    MUTED,
+    axes_or_new,
+    colours,
+    line_styles,
+    new_figure,
+    put_legend,
+    styled,
+)
 
 if TYPE_CHECKING:
     from copsense.logs import LogComparison
+    from copsense.logs.log_statics import LogStatics
 
 _MEASURED: dict[str, Any] = {"color": INK, "linewidth": 1.0}
 _REST: dict[str, Any] = {"linewidth": 1.1, "linestyle": (0, (1.2, 1.4))}
+_BEGINNING = "#c3c9cf"  # of a log, which the slopes leave out
 _MOST = 4  # joints whose torques are drawn
 
 
@@ -25,47 +39,61 @@ _MOST = 4  # joints whose torques are drawn
 def plot_log(comparison: LogComparison) -> Figure:
     """Draw a comparison: load over time and over the CoM, CoPs and torques over time.
 
-    Black is what was measured, a colour a criterion: dotted at rest, solid in motion. In the second
-    panel the beginning that the slopes leave out is grey.
+    In the second panel the beginning that the slopes leave out is grey.
     """
     figure = new_figure(12.0, 7.4)
     panels = figure.subplots(2, 2)
-    colour = colours(dict.fromkeys(s.criterion for s in comparison.statics))
-    _draw_load(panels[0, 0], comparison, colour)
-    _draw_law(panels[0, 1], comparison, colour)
-    _draw_cops(panels[1, 0], comparison, colour)
-    _draw_torques(panels[1, 1], comparison, colour)
-    for ax in (panels[0, 0], *panels[1]):
-        ax.set_xlabel("time [s]")
-    handles = _handles(comparison, colour)
+    plot_log_load(comparison, ax=panels[0, 0], legend=False)
+    plot_log_slope(comparison, ax=panels[0, 1])
+    plot_log_cop(comparison, ax=panels[1, 0], legend=False)
+    plot_log_torques(comparison, ax=panels[1, 1])
+    handles = _handles(comparison)
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     figure.suptitle(comparison.heading, x=0.01, ha="left", fontsize=12.5, fontweight="bold")
     return figure
 
 
-def _look(statics: Any, colour: dict[str, str]) -> dict[str, Any]:
-    found = {"color": colour[statics.criterion], "linewidth": 1.3}
-    return found if statics.inertia else found | _REST
+@styled
+def plot_log_load(
+    comparison: LogComparison, *, ax: Axes | None = None, legend: bool = True
+) -> Axes:
+    """Draw the share of the load on each contact over time, after Fig. 6; of criteria in motion.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        ax: where to draw; default a new figure.
+        legend: whether to explain the lines.
+    """
+    ax = axes_or_new(ax)
+    colour, names = _colour(comparison), comparison.contact_names
+    styles = line_styles(names)
+    for k, name in enumerate(names):
+        for each in _in_motion(comparison):
+            look = _look(each, colour) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.shares[:, k], **look)
+        ax.plot(
+            comparison.times, comparison.shares[:, k], **(_MEASURED | {"linestyle": styles[name]})
+        )
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel("load share, in motion")
+    _explain(ax, comparison, legend)
+    return ax
 
 
-def _handles(comparison: LogComparison, colour: dict[str, str]) -> list[Line2D]:
-    lines = [Line2D([], [], label="measured", **_MEASURED)]
-    return lines + [Line2D([], [], label=s.name, **_look(s, colour)) for s in comparison.statics]
+@styled
+def plot_log_slope(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+    """Draw the load share of the first contact over the CoM, with the line of every criterion.
 
-
-def _draw_load(ax: Axes, comparison: LogComparison, colour: dict[str, str]) -> None:
-    times, name = comparison.times, comparison.contact_names[0]
-    for each in comparison.statics:
-        ax.plot(times, each.shares[:, 0], **_look(each, colour))
-    ax.plot(times, comparison.shares[:, 0], **_MEASURED)
-    ax.set_ylabel(f"share of the load on {name}")
-
-
-def _draw_law(ax: Axes, comparison: LogComparison, colour: dict[str, str]) -> None:
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        ax: where to draw; default a new figure.
+    """
+    ax = axes_or_new(ax)
+    colour = _colour(comparison)
     travel = comparison.travel * MM
     late = comparison.times >= comparison.skipped
     share = comparison.shares[:, 0]
-    ax.plot(travel[~late], share[~late], ".", color="#c3c9cf", markersize=2)
+    ax.plot(travel[~late], share[~late], ".", color=_BEGINNING, markersize=2)
     ax.plot(travel[late], share[late], ".", color=INK, markersize=2.5)
     ends = np.array([travel.min(), travel.max()])
     load = comparison.slopes.get("load", {})
@@ -77,59 +105,174 @@ def _draw_law(ax: Axes, comparison: LogComparison, colour: dict[str, str]) -> No
             ax.plot(ends, line, label=f"{each.name}: {slope.value:.3f}", **_look(each, colour))
     if "measured" in load:
         found = load["measured"]
-        ax.plot(
-            [],
-            [],
-            ".",
-            color=INK,
-            label=f"measured: {found.value:.3f} [{found.low:.3f}, {found.high:.3f}]",
-        )
+        text = f"measured: {found.value:.3f} [{found.low:.3f}, {found.high:.3f}]"
+        ax.plot([], [], ".", color=INK, label=text)
     ax.set_xlabel("CoM along the line between the feet [mm]")
     ax.set_ylabel(f"share of the load on {comparison.contact_names[0]}")
     if load:
         ax.legend(fontsize=8, loc="best")
+    return ax
 
 
-def _draw_cops(ax: Axes, comparison: LogComparison, colour: dict[str, str]) -> None:
-    """The axis of the contact along which the CoPs move most."""
-    spans = [np.nanmax(np.ptp(s.cops, axis=0), axis=0) for s in comparison.statics]
-    axis = int(np.argmax(np.max(spans, axis=0))) if spans else 1
+@styled
+def plot_log_cop(comparison: LogComparison, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+    """Draw the CoP of each contact in its own frame over time, after Figs. 7 and 8.
+
+    Of both axes the one along which the CoPs move most; of criteria in motion.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        ax: where to draw; default a new figure.
+        legend: whether to explain the lines' colours.
+    """
+    ax = axes_or_new(ax)
+    colour, axis = _colour(comparison), _cop_axis(comparison)
     styles = line_styles(comparison.contact_names)
     for k, name in enumerate(comparison.contact_names):
-        for each in comparison.statics:
-            if each.inertia:
-                look = _look(each, colour) | {"linestyle": styles[name]}
-                ax.plot(comparison.times, each.cops[:, k, axis] * MM, **look)
+        for each in _in_motion(comparison):
+            look = _look(each, colour) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.cops[:, k, axis] * MM, **look)
         cops = comparison.cops[:, k, axis]
         if np.isfinite(cops).any():
             ax.plot(comparison.times, cops * MM, **(_MEASURED | {"linestyle": styles[name]}))
+    ax.set_xlabel("time [s]")
     ax.set_ylabel(f"CoP {'xy'[axis]} in the foot, in motion [mm]")
-    lines = [
-        Line2D([], [], color=MUTED, linestyle=styles[name], label=name)
-        for name in comparison.contact_names
-    ]
-    if not np.isfinite(comparison.cops).any():
-        lines.append(Line2D([], [], color="none", label="(no moments measured)"))
+    _explain(ax, comparison, legend, bool(np.isfinite(comparison.cops).any()))
+    return ax
+
+
+@styled
+def plot_log_joint(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+    """Draw the first contact's CoP over the joint that moves most, after Fig. 9b.
+
+    What was measured is drawn where moments were; criteria in motion, and dotted at rest.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        ax: where to draw; default a new figure.
+    """
+    ax = axes_or_new(ax)
+    log, colour, axis = comparison.log, _colour(comparison), _cop_axis(comparison)
+    name = moving_joint(comparison)
+    known = np.isfinite(log.positions[:, log.joint_names.index(name)])
+    angle = np.interp(
+        comparison.times,
+        log.times[known],
+        log.positions[known, log.joint_names.index(name)] * DEG,
+    )
+    for each in comparison.statics:
+        size = 2.0 if each.inertia else 1.0
+        cop = each.cops[:, 0, axis] * MM
+        ax.plot(angle, cop, ".", color=colour[each.criterion], markersize=size)
+    cops = comparison.cops[:, 0, axis] * MM
+    if np.isfinite(cops).any():
+        ax.plot(angle, cops, ".", color=INK, markersize=2.0)
+    ax.set_xlabel(f"{name} [deg]")
+    ax.set_ylabel(f"CoP {'xy'[axis]} in {comparison.contact_names[0]} [mm]")
+    lines = [Line2D([], [], color=c, label=n) for n, c in colour.items()]
+    if np.isfinite(cops).any():
+        lines.append(Line2D([], [], label="measured", **_MEASURED))
     put_legend(ax, lines)
+    return ax
 
 
-def _draw_torques(ax: Axes, comparison: LogComparison, colour: dict[str, str]) -> None:
-    """The joints whose torques the criteria see move most."""
+@styled
+def plot_log_torques(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+    """Draw the joints whose torques the criteria see move most, over time.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        ax: where to draw; default a new figure.
+    """
+    ax = axes_or_new(ax)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel("torque, in motion [Nm]")
     if not comparison.statics:
-        return
+        return ax
+    colour = _colour(comparison)
     spans = np.max([np.ptp(s.torques, axis=0) for s in comparison.statics], axis=0)
     joints = np.argsort(-spans)[: min(_MOST, len(spans))]
     styles = line_styles([comparison.torque_names[j] for j in joints])
     for j in joints:
         name = comparison.torque_names[j]
-        for each in comparison.statics:
-            if each.inertia:
-                look = _look(each, colour) | {"linestyle": styles[name]}
-                ax.plot(comparison.times, each.torques[:, j], **look)
+        for each in _in_motion(comparison):
+            look = _look(each, colour) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.torques[:, j], **look)
         if comparison.torques is not None and not math.isnan(float(comparison.torques[0, j])):
             look = _MEASURED | {"linestyle": styles[name]}
             ax.plot(comparison.times, comparison.torques[:, j], **look)
-    ax.set_ylabel("torque, in motion [Nm]")
     put_legend(
         ax, [Line2D([], [], color=MUTED, linestyle=s, label=name) for name, s in styles.items()]
     )
+    return ax
+
+
+@styled
+def plot_log_intervals(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+    """Draw the load's slope with its 95 % interval: a band measured, a point each criterion.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned, with slopes of the load.
+        ax: where to draw; default a new figure.
+    """
+    load, colour = comparison.slopes["load"], _colour(comparison)
+    ax = axes_or_new(ax, height=0.9 + 0.42 * len(load))
+    measured = load["measured"]
+    ax.axvspan(measured.low, measured.high, color=INK, alpha=0.12, linewidth=0)
+    ax.axvline(measured.value, color=INK, linewidth=1.0)
+    for row, each in enumerate(comparison.statics):
+        slope = load[each.name]
+        ax.plot([slope.low, slope.high], [row, row], color=colour[each.criterion], linewidth=2.0)
+        face = colour[each.criterion] if each.inertia else "white"
+        ax.plot(slope.value, row, "o", color=colour[each.criterion], markerfacecolor=face)
+    ax.set_yticks(range(len(comparison.statics)), [s.name for s in comparison.statics])
+    ax.set_ylim(len(comparison.statics) - 0.5, -0.5)
+    ax.set_xlim(left=min(0.0, *(s.low for s in load.values())))
+    ax.set_xlabel("slope of the load [1]")
+    put_legend(ax, [Line2D([], [], label="measured, 95 % interval", **_MEASURED)])
+    return ax
+
+
+def moving_joint(comparison: LogComparison) -> str:
+    """The joint of a log that moves most."""
+    span = np.nanmax(comparison.log.positions, axis=0) - np.nanmin(comparison.log.positions, axis=0)
+    return comparison.log.joint_names[int(np.nanargmax(span))]
+
+
+def _colour(comparison: LogComparison) -> dict[str, str]:
+    return colours(dict.fromkeys(s.criterion for s in comparison.statics))
+
+
+def _in_motion(comparison: LogComparison) -> list[LogStatics]:
+    return [s for s in comparison.statics if s.inertia]
+
+
+def _look(statics: LogStatics, colour: dict[str, str]) -> dict[str, Any]:
+    found = {"color": colour[statics.criterion], "linewidth": 1.3}
+    return found if statics.inertia else found | _REST
+
+
+def _cop_axis(comparison: LogComparison) -> int:
+    """The axis of the contacts along which the CoPs move most."""
+    spans = [np.nanmax(np.ptp(s.cops, axis=0), axis=0) for s in comparison.statics]
+    return int(np.argmax(np.max(spans, axis=0))) if spans else 1
+
+
+def _handles(comparison: LogComparison) -> list[Line2D]:
+    colour = _colour(comparison)
+    lines = [Line2D([], [], label="measured", **_MEASURED)]
+    return lines + [Line2D([], [], label=s.name, **_look(s, colour)) for s in comparison.statics]
+
+
+def _explain(ax: Axes, comparison: LogComparison, whole: bool, measured: bool = True) -> None:
+    """A legend of the contacts' line styles, and of the colours where it is to be whole."""
+    styles = line_styles(comparison.contact_names)
+    lines = [Line2D([], [], color=MUTED, linestyle=s, label=name) for name, s in styles.items()]
+    if not (measured or whole):
+        lines.append(Line2D([], [], color="none", label="(no moments measured)"))
+    if whole:
+        colours_of = _colour(comparison).items()
+        lines = [Line2D([], [], color=c, label=name) for name, c in colours_of] + lines
+        if measured:
+            lines.insert(0, Line2D([], [], label="measured", **_MEASURED))
+    put_legend(ax, lines)

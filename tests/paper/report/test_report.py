@@ -4,10 +4,10 @@ import csv
 import json
 import re
 import shlex
-from html.parser import HTMLParser
 
 import pytest
 from click.testing import CliRunner
+from support.pages import Page
 from support.reproductions import blank_pictures
 
 import copsense
@@ -18,37 +18,13 @@ from copsense.paper.report import (
     check_report_folder,
     render_page,
     report_figures,
-    report_folder,
+    report_files,
     write_report,
 )
-from copsense.paper.report.page import number
-from copsense.paper.report.typesetting import typeset
 from copsense.paper.report.words import commands, summary
+from copsense.paper.reproduce.real_robot import PUBLIC_PLACE, RECORDED
 from copsense.plots import render_figure
-
-
-class Page(HTMLParser):
-    """Tags with their attributes, and text by the tag it stands in."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.open, self.text = [], [], {}
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in ("img", "meta", "link"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag, "tags are not nested"
-
-    def handle_data(self, data):
-        for tag in set(self.open):
-            self.text.setdefault(tag, []).append(data)
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.tags if name == tag]
+from copsense.reports import read_number, typeset
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +65,7 @@ def test_the_page_needs_nothing_from_elsewhere(page, text):
     assert "@import" not in text
     assert "url(" not in re.sub(r"data:[^\"]*", "", text)
     outside = [a["href"] for a in page.all("a") if not a["href"].startswith("#")]
-    assert outside == ["https://arxiv.org/abs/1610.01495"]
+    assert outside == ["https://arxiv.org/abs/1610.01495", PUBLIC_PLACE]
 
 
 def test_links_within_the_page_lead_somewhere(page):
@@ -173,7 +149,7 @@ def test_what_the_user_typed_is_shown_and_not_interpreted(reproduction):
     ],
 )
 def test_numbers_are_written_to_be_read(value, unit, shown):
-    assert number(value, unit) == shown
+    assert read_number(value, unit) == shown
 
 
 @pytest.mark.parametrize(
@@ -232,6 +208,15 @@ def test_the_commands_shown_run(reproduction, command, tmp_path, monkeypatch):
         assert result.exit_code == 0, (line, result.output)
 
 
+def test_without_a_log_the_page_states_what_a_public_one_says(page):
+    cells = "".join(page.text["td"])
+    for found in RECORDED:
+        assert any(found.name in text for text in page.text["th"])
+        assert found.place in cells
+    assert "No log was given to this run." in "".join(page.text["p"])
+    assert "--log com-sinusoid.mat --log-robot model.urdf" in "".join(page.text["code"])
+
+
 # --- writing ------------------------------------------------------------------------------------
 
 
@@ -273,7 +258,7 @@ def test_a_report_that_fails_leaves_nothing_half_written(
     def fail(*_, **__):
         raise OSError("disk full")
 
-    monkeypatch.setattr(report_folder, "render_page", fail)
+    monkeypatch.setattr(report_files, "render_page", fail)
     with pytest.raises(OutputError, match="disk full"):
         write_report(reproduction, folder, overwrite=there)
     assert [path.name for path in tmp_path.iterdir()] == (["report"] if there else [])
@@ -285,7 +270,7 @@ def test_a_report_that_is_stopped_leaves_nothing(reproduction, tmp_path, monkeyp
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(report_folder, "render_page", stop)
+    monkeypatch.setattr(report_files, "render_page", stop)
     with pytest.raises(KeyboardInterrupt):
         write_report(reproduction, tmp_path / "report")
     assert list(tmp_path.iterdir()) == []

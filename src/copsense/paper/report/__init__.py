@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from copsense.extras import require
-
-require("jinja2", "the report")  # before the modules that import it
-
 from copsense.paper.report.errata_page import errata_markdown
 from copsense.paper.report.page import render_page
-from copsense.paper.report.report_figure import ReportFigure
-from copsense.paper.report.report_folder import check_report_folder, write_report
+from copsense.paper.report.report_files import write_report
 from copsense.paper.report.static_figures import report_figures
+from copsense.reports import ReportFigure, check_report_folder
 
 __all__ = [
     "ReportFigure",

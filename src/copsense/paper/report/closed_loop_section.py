@@ -12,7 +12,6 @@ from copsense.paper.claims import (
     Sway,
     stretch,
 )
-from copsense.paper.report.report_figure import ReportFigure
 from copsense.paper.report.sway_plots import (
     plot_sway_cop,
     plot_sway_hip_roll,
@@ -21,6 +20,7 @@ from copsense.paper.report.sway_plots import (
 )
 from copsense.paper.report.words import limit_words
 from copsense.plots.style import Figure
+from copsense.reports import ReportFigure
 
 _SECTION = "closed-loop"
 
@@ -186,7 +186,7 @@ def score_words(table: pd.DataFrame) -> tuple[str, ...]:
 def sway_differences(sway: Sway) -> tuple[str, ...]:
     """What differs from the experiment of 2017."""
     return (
-        "No hardware data: physics is simulated, and its contacts are rigid soles on rigid ground.",
+        "Physics is simulated, and its contacts are rigid soles on rigid ground.",
         f"The amplitude is not printed. {sway.amplitude * 1e3:g} mm lies between what the two "
         "criteria can do without limits, as the paper's outcome has it; the frequency, "
         f"{sway.frequency:g} Hz, is not printed either.",

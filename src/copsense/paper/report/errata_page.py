@@ -6,7 +6,7 @@ import re
 
 from copsense.paper.errata import ERRATA, Formula
 from copsense.paper.errata.erratum import FORMULA
-from copsense.paper.report.typesetting import typeset
+from copsense.reports.typesetting import typeset
 
 
 def errata_markdown() -> str:

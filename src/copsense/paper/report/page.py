@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import base64
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from importlib.resources import files
-
-from jinja2 import Environment, StrictUndefined
 
 from copsense.paper.claims import VERDICT_STANDARD, EvaluatedClaim, ReferenceValue, Verdict
 from copsense.paper.errata import EvaluatedErratum
@@ -18,10 +14,11 @@ from copsense.paper.report.closed_loop_section import (
     sway_rates,
     sway_runs,
 )
-from copsense.paper.report.report_figure import ReportFigure
-from copsense.paper.report.typesetting import typeset
+from copsense.paper.report.real_section import real_commands, real_reach, real_rows, real_words
 from copsense.paper.report.words import commands, differs, limit_words, limits, summary
 from copsense.paper.reproduce import Reproduction
+from copsense.paper.reproduce.real_robot import PUBLIC_PLACE
+from copsense.reports import ReportFigure, read_number, render_template
 from copsense.statics import ActiveSetChange
 
 _MARKS = {
@@ -29,7 +26,6 @@ _MARKS = {
     Verdict.HOLDS_IF: ("if", "◐", "hold if"),
     Verdict.DOES_NOT_HOLD: ("not", "✗", "do not hold"),
 }
-_ROUNDING = 1e-9
 
 
 def render_page(
@@ -50,24 +46,13 @@ def render_page(
     Returns:
         HTML that needs no other file and no network.
     """
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["typeset"] = typeset
-    folder = files("copsense.paper.report")
-    template = environment.from_string((folder / "report.html.jinja").read_text("utf-8"))
-    shown: dict[str, list[dict[str, object]]] = {}
-    for figure in figures:
-        address = base64.b64encode(pictures[figure.name]).decode("ascii")
-        shown.setdefault(figure.section, []).append(
-            {"figure": figure, "source": f"data:image/svg+xml;base64,{address}"}
-        )
-    return template.render(
-        style=(folder / "report.css").read_text("utf-8"),
-        summary=summary(reproduction),
-        counts=_counts(reproduction.claims),
-        standard=[(verdict.value.capitalize(), text) for verdict, text in VERDICT_STANDARD.items()],
-        claim_tables=(
+    values = {
+        "summary": summary(reproduction),
+        "counts": _counts(reproduction.claims),
+        "standard": [
+            (verdict.value.capitalize(), text) for verdict, text in VERDICT_STANDARD.items()
+        ],
+        "claim_tables": (
             ("the four-bar linkage", "four-bar", _claims(reproduction.four_bar_claims)),
             ("the iCub", "icub", _claims(reproduction.icub_claims)),
             *(
@@ -76,34 +61,32 @@ def render_page(
                 else ()
             ),
         ),
-        figures=shown,
-        commands=commands(reproduction, command),
-        errata=[_erratum(e) for e in reproduction.errata],
-        references=_references(reproduction),
-        agreeing=sum(r.agrees for r in reproduction.references),
-        parameters=reproduction.parameters,
-        versions=reproduction.versions,
-        timings={stage: f"{s:.2f} s" for stage, s in reproduction.timings.items()},
-        limits=limits(reproduction),
-        limit_words=limit_words(reproduction.within_limits.limits),
-        bindings=[_binding(b) for b in reproduction.within_limits.bindings],
-        sway_runs=sway_runs(reproduction.sway) if reproduction.sway else [],
-        rates=sway_rates(reproduction.sway) if reproduction.sway else {},
-        scores=[] if reproduction.benchmark is None else score_rows(reproduction.benchmark),
-        score_words=() if reproduction.benchmark is None else score_words(reproduction.benchmark),
-        sway_differences=sway_differences(reproduction.sway) if reproduction.sway else (),
-    )
-
-
-def number(value: float, unit: str = "1") -> str:
-    """A number to read: four digits, millimetres for short lengths, no unit if it has none."""
-    if unit == "m" and 1e-6 < abs(value) < 1.0:
-        return f"{value * 1e3:.4g} mm"
-    if abs(value) < _ROUNDING:
-        text = f"{value:.0e}" if value else "0"  # its digits say nothing
-    else:
-        text = f"{value:.1e}" if abs(value) < 1e-4 else f"{value:.4g}"
-    return text if unit == "1" else f"{text} {unit}"
+        "commands": commands(reproduction, command),
+        "real": {
+            "words": real_words(reproduction.real),
+            "rows": real_rows(reproduction.real),
+            "reach": real_reach(reproduction.real),
+            "commands": real_commands(),
+            "place": PUBLIC_PLACE,
+        },
+        "errata": [_erratum(e) for e in reproduction.errata],
+        "references": _references(reproduction),
+        "agreeing": sum(r.agrees for r in reproduction.references),
+        "parameters": reproduction.parameters,
+        "versions": reproduction.versions,
+        "timings": {stage: f"{s:.2f} s" for stage, s in reproduction.timings.items()},
+        "limits": limits(reproduction),
+        "limit_words": limit_words(reproduction.within_limits.limits),
+        "bindings": [_binding(b) for b in reproduction.within_limits.bindings],
+        "sway_runs": sway_runs(reproduction.sway) if reproduction.sway else [],
+        "rates": sway_rates(reproduction.sway) if reproduction.sway else {},
+        "scores": [] if reproduction.benchmark is None else score_rows(reproduction.benchmark),
+        "score_words": ()
+        if reproduction.benchmark is None
+        else score_words(reproduction.benchmark),
+        "sway_differences": sway_differences(reproduction.sway) if reproduction.sway else (),
+    }
+    return render_template("reproduction", ["copsense.paper.report"], figures, pictures, values)
 
 
 def _binding(found: ActiveSetChange) -> dict[str, str]:
@@ -136,7 +119,7 @@ def _claims(claims: tuple[EvaluatedClaim, ...]) -> list[dict[str, str]]:
                 "verdict": evaluated.verdict.value,
                 "kind": kind,
                 "mark": mark,
-                "number": number(evaluated.number, evaluated.unit),
+                "number": read_number(evaluated.number, evaluated.unit),
                 "explanation": evaluated.explanation,
                 "condition": evaluated.condition,
             }
@@ -159,9 +142,9 @@ def _erratum(evaluated: EvaluatedErratum) -> dict[str, str]:
     if found is not None:
         row |= {
             "measure": found.measure,
-            "off": number(found.as_printed) if differs(evaluated) else "0",
+            "off": read_number(found.as_printed) if differs(evaluated) else "0",
             "hypothesis": found.hypothesis,
-            "agreement": number(found.agreement),
+            "agreement": read_number(found.agreement),
         }
     return row
 
@@ -172,11 +155,11 @@ def _references(reproduction: Reproduction) -> list[dict[str, object]]:
         {
             "quantity": row.quantity,
             "criterion": row.criterion,
-            "reference": number(row.reference, row.unit),
-            "measured": number(row.measured, row.unit),
+            "reference": read_number(row.reference, row.unit),
+            "measured": read_number(row.measured, row.unit),
             "agrees": row.agrees,
             "difference": _difference(row),
-            "lowered": number(low.measured, low.unit),
+            "lowered": read_number(low.measured, low.unit),
         }
         for row, low in zip(reproduction.references, lowered, strict=True)
     ]

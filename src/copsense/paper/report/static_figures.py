@@ -13,7 +13,7 @@ from copsense.paper.report.paper_plots import (
     plot_figure_9b,
     plot_unit_of_length,
 )
-from copsense.paper.report.report_figure import ReportFigure
+from copsense.paper.report.real_section import real_figures
 from copsense.paper.reproduce import Reproduction
 from copsense.plots import (
     plot_cop,
@@ -26,6 +26,7 @@ from copsense.plots import (
     plot_torques,
 )
 from copsense.plots.style import Figure
+from copsense.reports import ReportFigure
 from copsense.statics import ActiveSetChange
 from copsense.sweeps import Sweep
 
@@ -41,6 +42,7 @@ def report_figures(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
         *_beyond(reproduction),
         *_limits(reproduction),
         *(sway_figures(reproduction.sway, reproduction.sway_claims) if reproduction.sway else ()),
+        *real_figures(reproduction.real),
     )
 
 

@@ -110,8 +110,9 @@ def limits(reproduction: Reproduction) -> tuple[str, ...]:
             else "Here each posture is an equilibrium: velocities, the controller's feedback, "
             "estimation of the contact forces and sensor noise are not in it."
         ),
-        "No measured data are at hand, so nothing here is compared with the hardware; the claims "
-        "of Section V are judged by whether they hold for the quasi-static motion they describe.",
+        "The paper's own measurements are not at hand; the claims of Section V are judged by "
+        "whether they hold for the quasi-static motion they describe. The real robot's log is of "
+        "another experiment, of normal forces alone, under a controller that is not stated.",
         "The amplitude of the CoM's sine is not printed. The static sweep goes from over one foot "
         "to over the other, as the text describes the motion.",
         "Outside the section on limits none are enforced on the wrenches (Remark 4): where a CoP "

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits
@@ -21,6 +22,7 @@ from copsense.paper.errata import evaluate_errata
 from copsense.paper.reproduce.benchmark_trials import benchmark_in_simulation
 from copsense.paper.reproduce.clock import Clock, Progress
 from copsense.paper.reproduce.closed_loop import sway_in_simulation
+from copsense.paper.reproduce.real_robot import compare_real_robot
 from copsense.paper.reproduce.reproduction import Reproduction
 from copsense.paper.reproduce.setting import ROBOT, describe_parameters, find_versions
 from copsense.paper.reproduce.sideways import (
@@ -48,6 +50,7 @@ def reproduce_paper(
     postures: int = 141,
     limits: Limits = LIMITS,
     sway_frequency: float | None = None,
+    real_log: tuple[str | Path, str] | None = None,
     progress: Progress | None = None,
 ) -> Reproduction:
     """Reproduce [Romano2016] on the four-bar and on the iCub.
@@ -56,11 +59,14 @@ def reproduce_paper(
         postures: of each lateral sweep of the iCub's CoM, from over one foot to over the other.
         limits: of the section on limits; the rest of the paper knows none.
         sway_frequency: of the CoM's sine in closed loop [Hz]; None leaves the closed loop out.
+        real_log: a real robot's log and the robot (URDF, MJCF, SDF or preset); None leaves the
+            comparison with it out.
         progress: called as ``progress(stage, done, total)``.
 
     Raises:
         InvalidInputError: fewer than 5 postures, or no limit switched on.
         InfeasibleError: no wrench respects the limits where the CoM is in the middle.
+        CopsenseError: the log cannot be read or compared.
         MissingExtraError: the iCub models are not installed, or MuJoCo is not for a closed loop.
     """
     if postures < _LEAST:
@@ -72,6 +78,8 @@ def reproduce_paper(
             "the report tells limits that are alike at every contact and joint. Give numbers."
         )
     clock = Clock(progress)
+    # First: a log that does not fit is rejected before minutes of work.
+    real = None if real_log is None else compare_real_robot(*real_log, clock)
     with shared_presets():
         stance, lowered = load_stance(ROBOT), load_stance(ROBOT, contact_at="sole")
     for criterion in paper_criteria():
@@ -106,6 +114,7 @@ def reproduce_paper(
         within_limits=within,
         sway=sway,
         benchmark=benchmark,
+        real=real,
         four_bar_claims=claims,
         icub_claims=icub_claims,
         sway_claims=() if sway is None else evaluate_sway_claims(sway),

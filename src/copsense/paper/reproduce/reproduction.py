@@ -13,6 +13,7 @@ from copsense.limits import Limits
 from copsense.paper.claims import EvaluatedClaim, LateralSweep, ReferenceValue, Sway
 from copsense.paper.closed_form import FigureData, FourBar
 from copsense.paper.errata import EvaluatedErratum
+from copsense.paper.reproduce.real_robot import RealRobot
 from copsense.regions import ComRegion
 from copsense.statics import ActiveSetChange
 from copsense.sweeps import Sweep
@@ -70,6 +71,7 @@ class Reproduction:
         sway: Section V's motion in closed loop, criteria 1 and 2; None where it was left out.
         benchmark: leans, pushes and a sway under both criteria, as `copsense.comparison` gives
             them; None where the closed loop was left out.
+        real: a real robot's log; None where none was given.
         four_bar_claims: Sections I to IV and VI, judged on the four-bar.
         icub_claims: Sections V and VI, judged on the iCub.
         sway_claims: Section V, judged in closed loop.
@@ -93,6 +95,7 @@ class Reproduction:
     within_limits: WithinLimits
     sway: Sway | None
     benchmark: pd.DataFrame | None
+    real: RealRobot | None
     four_bar_claims: tuple[EvaluatedClaim, ...]
     icub_claims: tuple[EvaluatedClaim, ...]
     sway_claims: tuple[EvaluatedClaim, ...]

@@ -14,8 +14,7 @@ class ReportFigure:
 
     Attributes:
         name: file name without suffix.
-        section: where it stands: ``"overview"``, ``"four-bar"``, ``"icub"``, ``"beyond"``,
-            ``"limits"`` or ``"closed-loop"``.
+        section: where it stands, as the page's template has it, such as ``"overview"``.
         title: its number or name.
         caption: what to see in it.
         alt: what it shows, for who cannot see it.

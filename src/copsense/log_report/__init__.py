@@ -1,0 +1,9 @@
+"""The report on a robot's own log: one self-contained HTML page, its figures and its data."""
+
+from __future__ import annotations
+
+from copsense.log_report.log_figures import log_figures
+from copsense.log_report.log_page import render_log_page, write_log_report
+from copsense.log_report.log_words import slope_rows
+
+__all__ = ["log_figures", "render_log_page", "slope_rows", "write_log_report"]
