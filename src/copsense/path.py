@@ -225,7 +225,8 @@ def com_sweep(
         start: its first value, in the world [m].
         stop: its last [m].
         count: number of postures.
-        held: coordinate -> where the CoM is held instead, or held as well [m].
+        held: coordinate -> where the CoM is held instead, or held as well [m]; or joint -> where
+            it is held [rad, or m].
         cost: weights of the deviations from `stance`.
         progress: called with 1 after each posture.
 
@@ -233,34 +234,25 @@ def com_sweep(
         A path over the coordinate [m]. A posture out of reach is listed in `PosturePath.failures`.
 
     Raises:
-        UnknownNameError: a coordinate of another name.
+        UnknownNameError: a coordinate of another name, or a joint that the robot has not.
         InvalidInputError: the coordinate is held as well as swept, a value is not a number, or a
             planar robot is to move out of its plane.
     """
     check_stance(stance)
     check_at_rest(stance, "a path of postures")
-    fixed = dict(held or {})
-    for name in (coordinate, *fixed):
-        if name not in COM_COORDINATES:
-            raise UnknownNameError("coordinate of the CoM", str(name), COM_COORDINATES)
-        if name == "com_x" and stance.robot.base_nv != 6:
-            raise InvalidInputError(
-                f"robot {stance.robot.name!r} lives in a plane: its CoM has no x to choose. Sweep "
-                "com_y or com_z."
-            )
-    if coordinate in fixed:
-        raise InvalidInputError(f"{coordinate} is both swept and held. Leave it out of held.")
+    if coordinate not in COM_COORDINATES:
+        raise UnknownNameError("coordinate of the CoM", str(coordinate), COM_COORDINATES)
+    fixed = _held(stance, coordinate, held)
     middle = np.mean([world.translation for world in stance.placements], axis=0)
     level = COM_COORDINATES[0 if stance.robot.base_nv == 6 else 1 : 2]
     fast = [COM_COORDINATES[axis] for axis in held_com_axes(stance)]
     for name in level:
         if name != coordinate and name not in fast:  # where contacts hold it, it stays
             fixed.setdefault(name, float(middle[COM_COORDINATES.index(name)]))
-    where = [finite_number(fixed[n], f"{n} [m]") if n in fixed else None for n in COM_COORDINATES]
     values = _grid(start, stop, count)
     axis = COM_COORDINATES.index(coordinate)
     check_com_moves(stance, axis)
-    solver = _OfCom(stance, (where[0], where[1], where[2]), axis, cost)
+    solver = _Along(stance, coordinate, fixed, cost)
     return _sweep(stance, coordinate, "m", values, float(stance.com[axis]), solver, progress)
 
 
@@ -353,6 +345,7 @@ def joint_sweep(
     stop: float,
     count: int,
     *,
+    held: Mapping[str, float] | None = None,
     cost: PostureCost | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> PosturePath:
@@ -364,16 +357,21 @@ def joint_sweep(
         start: its first position [rad, or m for a prismatic joint].
         stop: its last position.
         count: number of postures.
+        held: coordinate of the CoM [m], or another joint [rad, or m], -> where it is held.
         cost: weights of the deviations from `stance`.
         progress: called with 1 after each posture.
+
+    Raises:
+        InvalidInputError: the joint is held as well as swept, or a value is not a number.
+        UnknownNameError: a joint is not in the model.
     """
     check_stance(stance)
     check_at_rest(stance, "a path of postures")
     robot = stance.robot
     now = robot.joint_position(stance.q, joint)
-
-    solver = _OfJoint(stance, joint, cost)
+    fixed = _held(stance, joint, held)
     values = _grid(start, stop, count)
+    solver = _Along(stance, joint, fixed, cost)
     return _sweep(stance, joint, robot.joint_unit(joint), values, now, solver, progress)
 
 
@@ -442,6 +440,27 @@ def _placed(stance: Stance, q: ArrayLike, number: int, *, project: bool) -> Stan
     return stance.at(found.q)
 
 
+def _held(stance: Stance, swept: str, held: Mapping[str, float] | None) -> dict[str, float]:
+    """What a sweep holds, coordinates of the CoM and joints alike, checked."""
+    robot, found = stance.robot, {}
+    for name in (swept, *(held or {})):
+        if name == "com_x" and robot.base_nv != 6:
+            raise InvalidInputError(
+                f"robot {robot.name!r} lives in a plane: its CoM has no x to choose. Sweep com_y "
+                "or com_z."
+            )
+        if name not in COM_COORDINATES and name not in robot.dof_names:
+            raise UnknownNameError(
+                "coordinate of the CoM or joint", str(name), (*COM_COORDINATES, *robot.dof_names)
+            )
+    for name, value in (held or {}).items():
+        if name == swept:
+            raise InvalidInputError(f"{name} is both swept and held. Leave it out of held.")
+        unit = "m" if name in COM_COORDINATES else robot.joint_unit(name)
+        found[name] = finite_number(value, f"{name} [{unit}]")
+    return found
+
+
 def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
     start, stop = finite_number(start, "a sweep's start"), finite_number(stop, "a sweep's stop")
     try:
@@ -456,45 +475,39 @@ def _grid(start: float, stop: float, count: int) -> Float[np.ndarray, " N"]:
     return np.linspace(start, stop, whole)
 
 
-def _held_x(stance: Stance) -> float | None:
-    """World x at which a lateral path holds the CoM; a planar robot has none to hold."""
-    return float(stance.com[0]) if stance.robot.base_nv == 6 else None
-
-
 @dataclass(frozen=True, eq=False)
-class _OfCom:
-    """Postures of a path of the CoM; classes and not closures, so that a path can be sent away."""
+class _Along:
+    """Postures of a path; a class and not a closure, so that a path can be sent away.
+
+    Attributes:
+        stance: the posture that every other stays nearest to.
+        coordinate: what varies, a coordinate of the CoM or a joint.
+        held: coordinates and joints that do not -> where they are [m, rad].
+        cost: weights of the deviations.
+    """
 
     stance: Stance
-    held: tuple[float | None, float | None, float | None]
-    axis: int
+    coordinate: str
+    held: Mapping[str, float]
     cost: PostureCost | None
 
     def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-        asked = list(self.held)
-        asked[self.axis] = value
-        found = solve_posture(near, com=asked, reference=self.stance.q, cost=self.cost)
-        column = sum(each is not None for each in asked[: self.axis])
-        return found.stance, found.tangents[:, column]
+        asked = {**self.held, self.coordinate: value}
+        x, y, z = (asked.get(name) for name in COM_COORDINATES)
+        joints = {name: at for name, at in asked.items() if name not in COM_COORDINATES}
+        found = solve_posture(
+            near, com=(x, y, z), joints=joints, reference=self.stance.q, cost=self.cost
+        )
+        # Columns: the coordinates of the CoM that are asked for, then the joints.
+        columns = [*(name for name in COM_COORDINATES if name in asked), *joints]
+        return found.stance, found.tangents[:, columns.index(self.coordinate)]
 
 
-def _lateral(stance: Stance) -> _OfCom:
+def _lateral(stance: Stance) -> _Along:
     """Postures of a lateral path: CoM x held where the stance has it."""
-    return _OfCom(stance, (_held_x(stance), None, None), 1, None)
-
-
-@dataclass(frozen=True, eq=False)
-class _OfJoint:
-    """Postures of a joint's path."""
-
-    stance: Stance
-    joint: str
-    cost: PostureCost | None
-
-    def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-        held = {self.joint: value}
-        found = solve_posture(near, joints=held, reference=self.stance.q, cost=self.cost)
-        return found.stance, found.tangents[:, 0]
+    # A planar robot has no x to hold.
+    held = {"com_x": float(stance.com[0])} if stance.robot.base_nv == 6 else {}
+    return _Along(stance, "com_y", held, None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -183,6 +183,48 @@ def solve_posture(
     raise UnreachablePostureError(_what_remains(here, h, axes, list(joints), wanted))
 
 
+def move_stance(
+    stance: Stance,
+    *,
+    com_x: float | None = None,
+    com_y: float | None = None,
+    com_z: float | None = None,
+    joints: Mapping[str, float] | None = None,
+) -> Stance:
+    """A stance moved with its contacts in place, staying nearest to where it was.
+
+    Args:
+        stance: the stance.
+        com_x: world x of the CoM to move to [m]; None holds it.
+        com_y: world y likewise [m].
+        com_z: its height [m]; None leaves it free.
+        joints: joint -> position to put it at [rad, or m for a prismatic joint].
+
+    Returns:
+        The stance there; the same one where nothing is asked for.
+
+    Raises:
+        InvalidInputError: a number that is none, or the x of a robot that lives in a plane.
+        UnreachablePostureError: no posture has the CoM and the joints there.
+        UnknownNameError: a joint is not in the model.
+    """
+    check_stance(stance)
+    if com_x is None and com_y is None and com_z is None and not joints:
+        return stance
+    planar = stance.robot.base_nv != 6
+    if planar and com_x is not None:
+        raise InvalidInputError(
+            f"robot {stance.robot.name!r} lives in a plane: its CoM has no x to choose. Leave "
+            "com_x (--com-x) out."
+        )
+    x, y = (
+        float(here) if at is None else at
+        for here, at in zip(stance.com, (com_x, com_y), strict=False)
+    )
+    com = (None if planar else x, y, com_z)
+    return solve_posture(stance, com=com, joints=joints).stance
+
+
 def carry_payload(
     stance: Stance,
     frame: str,

@@ -11,7 +11,8 @@ from copsense.batch import chart_posture
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.limits import Limits
-from copsense.posture import solve_posture
+from copsense.path import lateral_posture
+from copsense.posture import move_stance
 from copsense.stance import Stance
 from copsense.statics import (
     WrenchPolicy,
@@ -27,32 +28,43 @@ def asked_posture(
     joints: Mapping[str, float] | None,
     at: Mapping[str, float] | None,
 ) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-    """The posture asked for, and dq/dy (nv,) of the CoM's lateral path there.
+    """The posture asked for, and dq/dy (nv,) of the lateral path of the CoM that begins there.
+
+    Arguments and errors are those of `placed_stance`.
+    """
+    moved = placed_stance(stance, com, joints, at)
+    # The path stays nearest to the posture that is analysed, wherever that was moved from: a
+    # stance that was written down and read again has the same.
+    return lateral_posture(moved, float(moved.com[1]))
+
+
+def placed_stance(
+    stance: Stance,
+    com: tuple[float | None, float | None, float | None],
+    joints: Mapping[str, float] | None,
+    at: Mapping[str, float] | None,
+) -> Stance:
+    """The stance where it is asked for.
 
     Args:
         stance: what it is to be nearest to.
         com: world x, y and z of the CoM [m]; None holds x and y, and leaves z free.
-        joints: joint -> position to hold [rad, or m for a prismatic joint].
+        joints: joint -> position to put it at [rad, or m for a prismatic joint].
         at: coordinates of a posture chart instead, see `copsense.analysis.analyse`.
 
     Raises:
         UnreachablePostureError: there is none.
         InvalidInputError: `at` beside the others.
     """
-    if at:
-        if joints or any(value is not None for value in com):
-            raise InvalidInputError(
-                "at says where the CoM and the joints are, and so do com_x, com_y, com_z and "
-                "joints. Give at alone (it takes their names), or the others alone."
-            )
-        stance, com = chart_posture(stance, at), (None, None, None)
     x, y, z = com
-    if x is None and stance.robot.base_nv == 6:
-        x = float(stance.com[0])
-    posture = solve_posture(
-        stance, com=(x, float(stance.com[1]) if y is None else y, z), joints=joints
-    )
-    return posture.stance, posture.tangents[:, 0 if x is None else 1]
+    if not at:
+        return move_stance(stance, com_x=x, com_y=y, com_z=z, joints=joints)
+    if joints or any(value is not None for value in com):
+        raise InvalidInputError(
+            "at says where the CoM and the joints are, and so do com_x, com_y, com_z and "
+            "joints. Give at alone (it takes their names), or the others alone."
+        )
+    return chart_posture(stance, at)
 
 
 def determined_criteria(

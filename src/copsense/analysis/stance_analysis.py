@@ -44,7 +44,8 @@ class Analysis:
 
     Attributes:
         stance: the posture.
-        tangent: dq/dy (nv,) of the CoM's lateral path there, to which slopes refer.
+        tangent: dq/dy (nv,) of the lateral path of the CoM that begins there and stays nearest to
+            this posture, to which slopes refer.
         sensitivities: criterion's name -> sensitivity of every contact's CoP; its ``equilibrium``
             holds wrenches and torques.
         limits: what the wrenches respect; None for nothing.
@@ -237,9 +238,8 @@ def analyse(
         along: a joint per which the sensitivity is given too, along the CoM's lateral path.
         com_x: world x of the CoM to move to first [m]; None holds it.
         com_y: world y likewise [m].
-        com_z: world z to move to [m]; None leaves the height to the posture nearest to the
-            stance.
-        joints: joint -> position to hold [rad, or m for a prismatic joint].
+        com_z: its height to move to [m]; None leaves it free.
+        joints: joint -> position to put it at [rad, or m for a prismatic joint].
         at: coordinate -> value of the posture instead, by name as in
             `copsense.batch.PostureChart` [m, rad]: CoM, base, joints and where the feet stand.
             What is not named keeps the stance's value, where `com_y` alone lets everything give
