@@ -11,9 +11,8 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
-from copsense.cli.stance_memory import written
 from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import LENGTH, TIME, read_coordinates, read_positions
+from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
 
 
@@ -23,31 +22,12 @@ from copsense.errors import InvalidInputError
     "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
     "  copsense analyse icub --period 2s\n"
     "  copsense analyse icub --at com_y=30mm --at pitch=2deg --at l_sole:x=20mm\n"
+    "  copsense analyse icub --load l_hand=0:0:-20 --spring-load r_hand=500:0:500:0.2:-0.3:0.6\n"
+    "  copsense analyse icub --com-y 0.03 --payload l_hand=2 --save-stance carrying.toml\n"
     "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
 )
 @stance_options
 @criterion_options
-@click.option("--com-x", type=LENGTH, metavar="LENGTH", help="World x of the CoM; default held.")
-@click.option(
-    "--com-y", type=LENGTH, metavar="LENGTH", help="World y of the CoM; default the middle."
-)
-@click.option("--com-z", type=LENGTH, metavar="LENGTH", help="World z of the CoM; default free.")
-@click.option(
-    "--joint",
-    "joints",
-    multiple=True,
-    metavar="JOINT=POSITION",
-    help="Hold a joint there: degrees, or metres for a prismatic joint. Repeatable.",
-)
-@click.option(
-    "--at",
-    multiple=True,
-    metavar="COORDINATE=VALUE",
-    help="A coordinate of the posture, instead of --com-x, --com-y, --com-z and --joint: com_x, "
-    "com_y, com_z, base_x, base_y, base_z, roll, pitch, yaw, a joint, CONTACT:x, CONTACT:y or "
-    "CONTACT:yaw (metres, degrees, or with the unit). What is not named keeps the stance's "
-    "value: the base does not give way. Repeatable.",
-)
 @click.option(
     "--along",
     metavar="JOINT",
@@ -76,11 +56,6 @@ def analyse(
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,
-    com_x: float | None,
-    com_y: float | None,
-    com_z: float | None,
-    joints: tuple[str, ...],
-    at: tuple[str, ...],
     along: str | None,
     period: float | None,
     check: bool,
@@ -110,23 +85,8 @@ def analyse(
             "--limits friction=0.33,torque=model."
         )
     chosen = read_criteria(criteria, characteristic_length)
-    # The posture that is analysed is the one to write down, not the one it started from.
-    kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
-    home = read_stance(robot, **options)
-    analysis = analyse_stance(
-        home,
-        chosen,
-        within,
-        along,
-        com_x=com_x,
-        com_y=com_y,
-        com_z=com_z,
-        joints=read_positions(joints, home.robot),
-        at=read_coordinates(at, home),
-        check=check,
-        period=period,
-    )
-    written(analysis.stance, kept, robot, overwrite, options["package_dirs"])
+    stance = read_stance(robot, **options)
+    analysis = analyse_stance(stance, chosen, within, along, check=check, period=period)
     answer = analysis.to_dict()
     if regions is not None:
         assert within is not None
@@ -141,7 +101,7 @@ def analyse(
         echo_json(answer)
         return
     click.echo(str(analysis))
-    echo_notes(note for note in analysis.notes if note not in home.robot.notes)  # printed already
+    echo_notes(note for note in analysis.notes if note not in stance.robot.notes)  # printed already
     if check:
         click.echo("derivatives agree with finite differences to 1e-7 relative")
     if "regions" in answer:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +15,11 @@ import click
 from copsense.cli.controller_options import control_period_option
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import F
+from copsense.cli.place_options import place_options
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
-from copsense.cli.stance_memory import remember_stance, remembered_stance
+from copsense.cli.stance_memory import remembered_stance
+from copsense.cli.stance_options import read_stance, standing_options
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError
 from copsense.extras import require
@@ -26,9 +29,24 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from copsense.comparison import Case, ControllerChoice, PostureChoice, Trial
+    from copsense.comparison import Case, ControllerChoice, PostureChoice, RobotChoice, Trial
 
+_POSTURE_UNITS: dict[str, Unit] = {"knees": "rad", "width": "m"}
 _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torque_limit"
+
+_POSTURES = click.option(
+    "--posture",
+    "postures",
+    multiple=True,
+    metavar="WORDS",
+    help="own, straight, or knees=DEG and width=M with a comma between, each a posture of its own; "
+    "or JOINT=POSITION, of all of them. Repeatable; default straight and knees=0.6rad for the "
+    "robots whose knees are known, own for others and beside options of a stance.",
+)
+
+
+def _standing_options(command: F) -> F:
+    return standing_options(command, _POSTURES)
 
 
 @click.command(
@@ -36,29 +54,13 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     "  copsense benchmark --output table.csv --plot table.png\n"
     "  copsense benchmark icub talos --posture own --disturbance lean --jobs 2\n"
     "  copsense benchmark icub --limits friction=0.8,cop-margin=0.001 --disturbance falls\n"
+    "  copsense benchmark icub --com-y 0.01 --payload l_hand=1 --disturbance lean\n"
     "  copsense benchmark --stance carrying.toml --disturbance push\n"
     "  copsense benchmark --plan plan.toml --output table.csv"
 )
 @click.argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--plan", "plan_file", type=click.Path(), help="Take the cases from a TOML file.")
-@click.option(
-    "--stance",
-    "stance_file",
-    metavar="FILE",
-    is_eager=True,
-    callback=remember_stance,
-    help="A stance file (.toml) instead of ROBOTs; with its limits and criteria, unless options "
-    "give others.",
-)
 @criterion_options
-@click.option(
-    "--posture",
-    "postures",
-    multiple=True,
-    metavar="WORDS",
-    help="own, straight, or knees=DEG and width=M with a comma between. Repeatable; default "
-    "straight and knees=0.6rad for the robots whose knees are known, own for others.",
-)
 @click.option(
     "--disturbance",
     "disturbances",
@@ -68,11 +70,6 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     "Example: sway:amplitude=39mm,frequency=0.05.",
 )
 @click.option(
-    "--limits",
-    metavar="NAME=VALUE,...",
-    help="Limits of the controllers, as in `copsense balance`. Falls are counted with them only.",
-)
-@click.option(
     "--gains",
     type=click.Choice(["stiff", "public"]),
     default="stiff",
@@ -80,9 +77,6 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
     help="Gains: stiff, or soft ones like those the authors published.",
 )
 @control_period_option
-@click.option(
-    "--contact", "contacts", multiple=True, metavar="FRAME", help="Contact frame. Repeatable."
-)
 @click.option("--repeats", type=int, metavar="N", help="Perturbed pushes of falls; default 20.")
 @click.option("--seed", type=int, metavar="N", help="Of the falls' perturbations; default 0.")
 @click.option(
@@ -96,10 +90,11 @@ _TRIALS = "lean, push, sway, rest, falls, delay, bandwidth, velocity_noise, torq
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
 @click.option("--force", is_flag=True, help="Start the table again; overwrite the picture.")
 @click.option("--json", "as_json", is_flag=True, help="Print ranking and agreement as JSON.")
+@_standing_options
+@place_options
 def benchmark(
     robots: tuple[str, ...],
     plan_file: str | None,
-    stance_file: str | None,
     output: str | None,
     picture: str | None,
     jobs: int | None,
@@ -124,14 +119,15 @@ def benchmark(
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=redraw)
     if plan_file is None:
-        if stance_file is not None and robots:
+        file = remembered_stance()
+        if file is not None and robots:
             raise InvalidInputError(
-                f"--stance {stance_file} says which robot stands where, and so does "
+                f"--stance {file.path} says which robot stands where, and so does "
                 f"{', '.join(robots)}. Give one of them."
             )
-        plan = _plan(robots or (stance_file or "icub",), **options)
+        plan = _plan(robots or (str(file.path) if file else "icub",), **options)
     else:
-        _check_alone(robots, options | {"stance_file": stance_file})
+        _check_alone(robots, {*options, "stance_file"})
         plan = read_plan(plan_file)
     check_plan(plan)
     notes = _check_robots(plan)
@@ -171,15 +167,20 @@ def benchmark(
     click.get_current_context().exit(1 if len(wrong) else 0)
 
 
-def _check_alone(robots: tuple[str, ...], options: dict[str, Any]) -> None:
-    """Reject options that a plan file decides."""
+def _given(names: Collection[str]) -> list[str]:
+    """The options of these names that the command line has."""
     context = click.get_current_context()
-    given = [
+    return [
         option.opts[0]
         for option in context.command.params
-        if option.name in options
-        and getattr(context.get_parameter_source(option.name), "name", "") == "COMMANDLINE"
+        if option.name in names
+        and context.get_parameter_source(option.name) is click.core.ParameterSource.COMMANDLINE
     ]
+
+
+def _check_alone(robots: tuple[str, ...], names: Collection[str]) -> None:
+    """Reject options that a plan file decides."""
+    given = _given(names)
     if robots or given:
         raise InvalidInputError(
             f"a plan file says everything: leave {', '.join([*robots, *given])} out, or --plan."
@@ -195,16 +196,15 @@ def _plan(
     limits: str | None,
     gains: str,
     control_period: float,
-    contacts: tuple[str, ...],
     repeats: int | None,
     seed: int | None,
     quick: bool,
+    **standing: Any,
 ) -> tuple[Case, ...]:
     """The cases that the options ask for."""
     from copsense.comparison import (
         Conditions,
         ControllerChoice,
-        PostureChoice,
         RobotChoice,
         make_plan,
     )
@@ -222,24 +222,91 @@ def _plan(
         for criterion in chosen_criteria or ("minimum-wrench", "minimum-torque")
     ]
     trials = _trials(disturbances or ("lean", "push", "sway"), repeats, seed, quick)
-    cases: list[Case] = []
-    for source in dict.fromkeys(robots):
-        robot = RobotChoice(source, contacts=contacts)
-        chosen = [_posture(text) for text in dict.fromkeys(postures)]
-        if not chosen and robot.is_stance:
+    words = [text for text in dict.fromkeys(postures) if not _places_joints(text)]
+    contacts = standing["contacts"]
+    if len(words) < len(set(postures)) or _stands_apart(standing):
+        placed = [text for text in postures if _places_joints(text)]
+        stances = _stances(robots, words or ["own"], placed, standing)
+        pairs = [([robot], [posture]) for robot, posture in stances]
+    else:
+        choices = [RobotChoice(source, contacts=contacts) for source in dict.fromkeys(robots)]
+        pairs = [([robot], _usual(robot, words, quick)) for robot in choices]
+    return tuple(
+        case
+        for chosen, ways in pairs
+        for case in make_plan(chosen, ways, controllers, trials, [conditions])
+    )
+
+
+def _places_joints(text: str) -> bool:
+    """Whether a ``--posture`` is JOINT=POSITION, and not words of a benchmark."""
+    name, equals, _ = text.partition("=")
+    return bool(equals) and name not in _POSTURE_UNITS
+
+
+def _stands_apart(standing: Mapping[str, Any]) -> bool:
+    """Whether options say more of how a robot stands than the frames of its contacts."""
+    return bool(_given(standing.keys() - {"contacts"})) or any(
+        ":" in text for text in standing["contacts"]
+    )
+
+
+def _stances(
+    robots: Sequence[str],
+    words: Sequence[str],
+    placed: Sequence[str],
+    standing: Mapping[str, Any],
+) -> Iterator[tuple[RobotChoice, PostureChoice]]:
+    """The one robot as the options of a stance let it stand, in each of the postures."""
+    from copsense.comparison import PostureChoice, RobotChoice
+    from copsense.robots import stance_data
+
+    if len(robots) > 1:
+        raise InvalidInputError(
+            f"options of a stance are those of one robot, and {len(robots)} are named. Name one, "
+            "or write stance files or a plan."
+        )
+    if standing["save_stance"] is not None and len(words) > 1:
+        raise InvalidInputError(
+            f"--save-stance writes one stance, and there are {len(words)} postures. Give one."
+        )
+    file, (source,) = remembered_stance(), robots
+    for text in words:
+        choice = _posture(text)
+        angles = [f"{joint}={angle!r}rad" for joint, angle in choice.angles(source).items()]
+        options = dict(standing, posture=(*angles, *placed))
+        if choice.width is not None:
+            if standing["width"] is not None:
+                raise InvalidInputError(f"--width and --posture {text} both say it. Give one.")
+            options["width"] = choice.width
+        stance = read_stance(None if file else source, **options)
+        tables = stance_data(
+            stance,
+            Path.cwd(),
+            robot=file.source if file else source,
+            package_dirs=file.package_dirs if file else standing["package_dirs"],
+        )
+        yield RobotChoice(source, tables=tables), PostureChoice(text)
+
+
+def _usual(robot: RobotChoice, words: Sequence[str], quick: bool) -> list[PostureChoice]:
+    """The postures that are asked for, or the usual ones of a robot."""
+    from copsense.comparison import PostureChoice
+
+    chosen = [_posture(text) for text in words]
+    if not chosen and robot.is_stance:
+        chosen = [PostureChoice()]
+    if not chosen:
+        usual = ("straight",) if quick else ("straight", "knees=0.6rad")
+        chosen = [_posture(text) for text in usual]
+        try:
+            chosen[0].angles(robot.source)
+        except KeyError:  # its knees are not known
             chosen = [PostureChoice()]
-        if not chosen:
-            usual = ("straight",) if quick else ("straight", "knees=0.6rad")
-            chosen = [_posture(text) for text in usual]
-            try:
-                chosen[0].angles(source)
-            except KeyError:  # its knees are not known
-                chosen = [PostureChoice()]
-        for posture in chosen:
-            robot.check_own(posture)
-            posture.angles(source)
-        cases += make_plan([robot], chosen, controllers, trials, [conditions])
-    return tuple(cases)
+    for posture in chosen:
+        robot.check_own(posture)
+        posture.angles(robot.source)
+    return chosen
 
 
 def _check_robots(plan: Sequence[Case]) -> list[str]:
@@ -250,7 +317,11 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     """
     from copsense.robots import PRESETS, load_robot, load_stance
 
-    asked = ((c.robot.source, (*c.robot.contacts, *(c.robot.soles or ()))) for c in plan)
+    asked = (
+        (c.robot.source, (*c.robot.contacts, *(c.robot.soles or ())))
+        for c in plan
+        if c.robot.tables is None  # else it stands already
+    )
     notes: list[str] = []
     for source, frames in dict.fromkeys(asked):
         if source.endswith(".toml"):
@@ -271,16 +342,15 @@ def _posture(text: str) -> PostureChoice:
 
     if text in ("own", "straight"):
         return PostureChoice(text, 0.0 if text == "straight" else None)
-    units: dict[str, Unit] = {"knees": "rad", "width": "m"}
     values: dict[str, float] = {}
     for part in text.split(","):
         name, _, value = part.partition("=")
-        if name not in units:
+        if name not in _POSTURE_UNITS:
             raise InvalidInputError(
                 f"the posture {text!r} is not understood. Give own, straight, knees=DEG, width=M, "
-                "or knees=40,width=0.2; joints by name in a plan file."
+                "knees=40,width=0.2, or JOINT=POSITION."
             )
-        values[name] = read_quantity(value, units[name])
+        values[name] = read_quantity(value, _POSTURE_UNITS[name])
     return PostureChoice(text, values.get("knees"), values.get("width"))
 
 

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 import click
 
 from copsense.cli.option_lists import F, with_options
-from copsense.cli.units import LENGTH, Unit, read_quantity, split_assignment
+from copsense.cli.units import LENGTH, Unit, read_numbers, read_quantity, split_assignment
 from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from copsense.contact import Contact
 
 _OFFSET = "FRAME=X:Y:Z in metres, in the frame's axes, such as l_foot=0:0:-0.05"
@@ -22,6 +24,8 @@ _GROUND = (
     "FRAME=ROLL:PITCH[:HEIGHT], degrees and metres, such as l_foot=0:10 (a slope) or "
     "l_foot=0:0:0.15 (a step)"
 )
+_FRICTION = "FRAME=MU[:TORSION], such as l_foot=0.6 or l_foot=0.6:0.02 (metres)"
+_CORNERS = "its corners X:Y,X:Y,X:Y [m], such as 0.1:0,-0.05:0.04,-0.05:-0.04"
 _PLANE = (
     "FRAME=NX:NY:NZ[:X:Y:Z], an outward normal and a point in metres, such as "
     "l_hand=-1:0:0:0.4:0:0 (a wall 0.4 m ahead)"
@@ -59,9 +63,11 @@ def contact_options(command: F) -> F:
         ),
         click.option(
             "--sole",
-            metavar="X0:X1:Y0:Y1",
-            help="Rectangle of every surface contact's sole in its contact frame [m], instead of "
-            "the collision geometry's.",
+            multiple=True,
+            metavar="[FRAME=]X0:X1:Y0:Y1",
+            help="Rectangle of the sole in its contact frame [m], instead of the collision "
+            "geometry's: of every surface contact, or of one. Another outline by its corners, "
+            "X:Y,X:Y,X:Y. Repeatable.",
         ),
         click.option(
             "--sole-height",
@@ -96,6 +102,14 @@ def contact_options(command: F) -> F:
             "Repeatable.",
         ),
         click.option(
+            "--contact-friction",
+            "frictions",
+            multiple=True,
+            metavar="FRAME=MU[:TORSION]",
+            help="Coulomb coefficient of a contact, and its torsional coefficient [m], which "
+            "limits take unless they have their own. Repeatable.",
+        ),
+        click.option(
             "--plane",
             "planes",
             multiple=True,
@@ -112,31 +126,33 @@ def read_contacts(
     texts: Sequence[str],
     frames: Collection[str],
     *,
-    sole: str | None,
+    sole: Sequence[str],
     sole_height: float | None,
     offsets: Sequence[str],
     turns: Sequence[str],
     grounds: Sequence[str],
     planes: Sequence[str],
-) -> list[str | Contact] | None:
+    frictions: Sequence[str] = (),
+) -> list[Contact] | None:
     """The contacts that the options of `contact_options` say; None where they say nothing.
 
     Args:
         robot: the robot's name or file; a preset's contacts come along.
         texts: ``FRAME[:KIND]``; a frame alone takes what its preset knows of it.
         frames: the robot's frames.
-        sole: ``X0:X1:Y0:Y1``.
+        sole: ``[FRAME=]X0:X1:Y0:Y1``, or corners ``X:Y,X:Y,X:Y``.
         sole_height: of the contact plane over the frames [m].
         offsets: ``FRAME=X:Y:Z``.
         turns: ``FRAME=ROLL:PITCH:YAW``.
         grounds: ``FRAME=ROLL:PITCH[:HEIGHT]``.
         planes: ``FRAME=NX:NY:NZ[:X:Y:Z]``.
+        frictions: ``FRAME=MU[:TORSION]``.
 
     Raises:
         InvalidInputError: an option that is not understood, or two that contradict each other.
         UnknownNameError: a kind, or a frame that is none of the contacts'.
     """
-    from copsense.contact import Contact, rectangle
+    from copsense.contact import Contact
     from copsense.robots import PRESETS
 
     known = PRESETS[robot].contacts if robot in PRESETS else ()
@@ -146,15 +162,12 @@ def read_contacts(
         own = next((c for c in known if c.frame == frame), Contact(frame))
         contacts.append(own if kind is None else replace(own, kind=kind))  # type: ignore[arg-type]
     contacts = _placed(contacts, offsets, turns, grounds, planes)
-    described = sole is not None or sole_height is not None
-    if described and contacts and all(c.kind == "point" for c in contacts):
+    if (sole or sole_height is not None) and contacts and all(c.kind == "point" for c in contacts):
         raise InvalidInputError(
             "--sole and --sole-height describe a sole, and every contact is a point. Leave them "
             "out, or give a surface contact: --contact FRAME:surface."
         )
-    if sole is not None:
-        polygon = rectangle(*_read_rectangle(sole))
-        contacts = [replace(c, polygon=polygon) if c.kind != "point" else c for c in contacts]
+    contacts = _rubbing(_soled(contacts, sole), frictions)
     if sole_height is not None:
         if not math.isfinite(sole_height):
             raise InvalidInputError(f"--sole-height is {sole_height}. Give a finite height [m].")
@@ -218,19 +231,7 @@ def _numbers(
             raise UnknownNameError("contact", frame, contacts, "Name it by --contact as well.")
         if frame in found:
             raise InvalidInputError(f"{option} is given twice for {frame}. Give it once.")
-        parts = value.split(":")
-        if len(parts) not in {least or len(units), len(units)}:
-            raise InvalidInputError(f"{option} {text!r} is not understood. Give {form}.")
-        try:
-            numbers = [
-                float(part) if unit is None else read_quantity(part, unit)
-                for part, unit in zip(parts, units, strict=False)
-            ]
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{option} {text!r}: {error}") from None
-        except ValueError:
-            raise InvalidInputError(f"{option} {text!r} is not understood. Give {form}.") from None
-        found[frame] = numbers + [0.0] * (len(units) - len(numbers))
+        found[frame] = read_numbers(value, f"{option} {text!r}", form, units, least=least)
     return list(found.items())
 
 
@@ -256,6 +257,61 @@ def _frame_and_kind(text: str, frames: Collection[str]) -> tuple[str, str | None
     if frame in frames:
         raise UnknownNameError("kind of contact", kind, COMPONENTS)
     return text, None  # the look-up of the frame reports what there is
+
+
+def _soled(contacts: Sequence[Contact], texts: Sequence[str]) -> list[Contact]:
+    """The contacts with the soles that ``--sole`` says."""
+    found: dict[str, np.ndarray] = {}
+    names = [contact.frame for contact in contacts if contact.kind != "point"]
+    for text in texts:
+        frame, equals, outline = text.rpartition("=")
+        if equals and frame not in names:
+            raise UnknownNameError(
+                "contact with a sole", frame, names, "Name it by --contact as well."
+            )
+        if frame in found:
+            raise InvalidInputError(
+                f"--sole is given twice for {frame or 'every contact'}. Give it once."
+            )
+        found[frame] = _read_outline(outline)
+    soled = []
+    for contact in contacts:
+        own = found.get(contact.frame, found.get(""))
+        bare = contact.kind == "point" or own is None
+        soled.append(contact if bare else replace(contact, polygon=own))
+    return soled
+
+
+def _rubbing(contacts: Sequence[Contact], texts: Sequence[str]) -> list[Contact]:
+    """The contacts with the friction that ``--contact-friction`` says."""
+    found = {contact.frame: contact for contact in contacts}
+    seen: set[str] = set()
+    for text in texts:
+        frame, value = split_assignment(text, f"--contact-friction {_FRICTION}")
+        if frame not in found:
+            raise UnknownNameError("contact", frame, found, "Name it by --contact as well.")
+        if frame in seen:
+            raise InvalidInputError(f"--contact-friction is given twice for {frame}. Give it once.")
+        seen.add(frame)
+        said = f"--contact-friction {text!r}"
+        friction, torsion = read_numbers(value, said, _FRICTION, (None, "m"), least=1)
+        found[frame] = replace(found[frame], friction=friction)
+        if ":" in value:
+            found[frame] = replace(found[frame], torsional_friction=torsion)
+    return [found[contact.frame] for contact in contacts]
+
+
+def _read_outline(text: str) -> np.ndarray:
+    """``X0:X1:Y0:Y1``, or corners ``X:Y,X:Y,X:Y``, as a polygon (k, 2) [m]."""
+    import numpy as np
+
+    from copsense.contact import rectangle
+
+    if "," not in text:
+        return rectangle(*_read_rectangle(text))
+    said = f"the sole {text!r}"
+    corners = text.split(",")
+    return np.array([read_numbers(corner, said, _CORNERS, ("m", "m")) for corner in corners])
 
 
 def _read_rectangle(text: str) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import read_limits
+from copsense.cli.place_options import read_course
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
-from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import read_range
+from copsense.cli.stance_options import read_stance, swept_stance_options
+from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.design import Design, Score
+
+
+_USUAL = "-0.09:0.09:37"  # of --com-y
 
 
 @click.command(
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
     "  copsense design icub --family length --com-y -0.08:0.08:17\n"
     "  copsense design icub --family joints --limits friction=0.33,torque=model --plot design.png"
 )
-@stance_options
+@swept_stance_options
 @click.option(
     "--family",
     default="joints",
@@ -35,13 +39,6 @@ if TYPE_CHECKING:
     show_default=True,
     metavar="NAME",
     help="travel: the farthest CoM travel to the first limit; gain: the least |dCoP/dCoM|.",
-)
-@click.option(
-    "--com-y",
-    default="-0.09:0.09:37",
-    show_default=True,
-    metavar="START:STOP:COUNT",
-    help="The path: world y of the CoM [m], its middle being where the travel begins.",
 )
 @click.option(
     "--grid",
@@ -63,7 +60,10 @@ def design(
     limits: str | None,
     family: str,
     objective: Any,
-    com_y: str,
+    com_x: str | None,
+    com_y: str | None,
+    com_z: str | None,
+    joints: tuple[str, ...],
     grid: int,
     picture: str | None,
     force: bool,
@@ -72,22 +72,30 @@ def design(
 ) -> None:
     """Design the weights of a criterion for ROBOT, and say what they gain over the paper's two.
 
-    The CoM is swept sideways from the posture; each candidate is judged by how far it goes before
+    The CoM is swept sideways from the posture (--com-y, default -0.09:0.09:37, its middle being
+    where the travel begins); each candidate is judged by how far it goes before
     its own wrenches, unclipped, meet a limit.
     """
     from copsense.design import design_criterion, family_named
     from copsense.files import check_output
     from copsense.limits import Limits
-    from copsense.path import lateral_sweep
+    from copsense.path import com_sweep
 
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=force)
     within = read_limits(limits) or Limits()
-    start, stop, count = read_range(com_y, "m")
-    stance = read_stance(robot, **options)
+    course = read_course(com_x, com_y or _USUAL, com_z, joints)
+    if [*course.swept] != ["com_y"]:
+        raise InvalidInputError(
+            "a design sweeps the CoM sideways: give --com-y START:STOP:COUNT, and --com-x, --com-z "
+            "and --joint single values, which hold."
+        )
+    stance = read_stance(robot, **course.places, **options)
+    start, stop, count = course.range_of("com_y", stance.robot)
     chosen = family_named(stance, family)
-    with progress_bar(count, "postures") as update:
-        path = lateral_sweep(stance, start, stop, count, progress=update)
+    with progress_bar(max(count, 0), "postures") as update:
+        held = course.held(stance.robot)
+        path = com_sweep(stance, "com_y", start, stop, count, held=held, progress=update)
     with progress_bar(grid ** len(chosen.parameters), "candidates") as update:
         found = design_criterion(
             path, within, chosen, objective=objective, grid=grid, progress=update

@@ -10,6 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
+from copsense.cli.place_options import reject_varied
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_quantity
@@ -125,6 +126,7 @@ def map_command(
         raise InvalidInputError("--plot-over is for a picture. Give --plot FILE too.")
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
+    reject_varied([text.partition("=")[0] for text in over], options)
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)

@@ -17,6 +17,7 @@ from copsense.cli.stance_options import read_stance, stance_options
     epilog="\b\nExamples:\n"
     "  copsense push icub --plot push.png\n"
     "  copsense push icub --at l_hand --limits friction=0.6,torque=model --json\n"
+    "  copsense push icub --com-y 0.03 --joint torso_pitch=10 --payload l_hand=2\n"
     "  copsense push talos --at torso_2_link --point 0:0:0.2"
 )
 @stance_options

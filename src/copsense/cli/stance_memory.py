@@ -35,14 +35,12 @@ def remembered_stance() -> StanceFile | None:
 def written(
     stance: Stance,
     path: str | None,
-    source: str | Path | None,
+    source: str | Path,
     overwrite: bool,
-    package_dirs: Iterable[str] = (),
+    package_dirs: Iterable[str | Path] = (),
 ) -> Stance:
     """The stance, written to a file if one is asked for, with the command's limits and criteria."""
     if path is not None:
-        file = remembered_stance()
-        source = source or (file.source if file else "")
         from copsense.cli.criterion_options import read_criteria
         from copsense.cli.limit_options import read_limits
         from copsense.robots import save_stance

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,6 +13,7 @@ from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, with_options
+from copsense.cli.place_options import course_options, place_options, put_in_place
 from copsense.cli.printing import echo_notes
 from copsense.cli.stance_memory import remember_stance, remembered_stance, written
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
@@ -21,9 +24,32 @@ if TYPE_CHECKING:
 
 
 def stance_options(command: F) -> F:
-    """The robot, how it stands, and what it must respect."""
+    """The robot, how it stands, where its CoM is put, and what it must respect."""
+    return click.argument("robot", required=False)(standing_options(place_options(command)))
+
+
+def swept_stance_options(command: F) -> F:
+    """The same for a command that sweeps the CoM or a joint: a value holds, a range sweeps."""
+    return click.argument("robot", required=False)(standing_options(course_options(command)))
+
+
+_POSTURE = click.option(
+    "--posture",
+    multiple=True,
+    metavar="JOINT=POSITION",
+    help="Joint position that the posture stays nearest to: degrees, or metres for a "
+    "prismatic joint, or with its unit (20deg, 0.35rad, 25mm). Repeatable.",
+)
+
+
+def standing_options(command: F, posture: Callable[[Any], Any] | None = None) -> F:
+    """How a robot stands, and what it must respect.
+
+    Args:
+        command: to be decorated.
+        posture: the command's own ``--posture``.
+    """
     options = [
-        click.argument("robot", required=False),
         click.option(
             "--stance",
             "stance_file",
@@ -49,13 +75,7 @@ def stance_options(command: F) -> F:
             type=click.Path(file_okay=False),
             help="Folder in which package:// meshes are looked up. Repeatable.",
         ),
-        click.option(
-            "--posture",
-            multiple=True,
-            metavar="JOINT=POSITION",
-            help="Joint position that the posture stays nearest to: degrees, or metres for a "
-            "prismatic joint, or with its unit (20deg, 0.35rad, 25mm). Repeatable.",
-        ),
+        posture or _POSTURE,
         click.option(
             "--base-yaw",
             type=ANGLE,
@@ -85,19 +105,28 @@ def read_stance(
     contact_at: Any,
     soles: Any,
     level_soles: bool,
-    sole: str | None,
+    sole: tuple[str, ...],
     sole_height: float | None,
     offsets: tuple[str, ...],
     turns: tuple[str, ...],
     grounds: tuple[str, ...],
     planes: tuple[str, ...],
+    frictions: tuple[str, ...],
     package_dirs: tuple[str, ...],
     posture: tuple[str, ...],
     base_yaw: float | None,
     base_rpy: str | None,
     width: float | None,
-    loads: tuple[str, ...] = (),
-    payloads: tuple[str, ...] = (),
+    locked: tuple[str, ...],
+    loads: tuple[str, ...],
+    payloads: tuple[str, ...],
+    body_loads: tuple[str, ...],
+    spring_loads: tuple[str, ...],
+    com_x: float | None = None,
+    com_y: float | None = None,
+    com_z: float | None = None,
+    joints: tuple[str, ...] = (),
+    at: tuple[str, ...] = (),
     save_stance: str | None = None,
     force_stance: bool = False,
     **drives: tuple[str, ...],
@@ -110,12 +139,19 @@ def read_stance(
     from copsense.robot import Robot
     from copsense.robots import PRESETS, load_robot, load_stance, soles_read
 
+    def finished(standing: Stance, source: str | Path, folders: Iterable[str | Path]) -> Stance:
+        """Loaded, moved, and written down where that is asked for."""
+        loaded = put_loads(standing, loads, payloads, body_loads, spring_loads)
+        moved = put_in_place(loaded, com_x, com_y, com_z, joints, at)
+        return written(moved, save_stance, source, force_stance, folders)
+
     file = remembered_stance()
     if file is not None:
         touching = (contacts, contact_at, level_soles, sole, sole_height, offsets, turns, grounds)
-        placed = (*touching, planes, package_dirs, posture, base_yaw, base_rpy, width)
+        standing = (package_dirs, posture, base_yaw, base_rpy, width, locked)
         if robot is not None or any(
-            value not in (None, (), False) for value in (*placed, *drives.values())
+            value not in (None, (), False)
+            for value in (*touching, planes, frictions, *standing, *drives.values())
         ):
             raise InvalidInputError(
                 f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
@@ -123,7 +159,7 @@ def read_stance(
             )
         stance = file.stance()
         echo_notes(stance.robot.notes)
-        return written(put_loads(stance, loads, payloads), save_stance, file.source, force_stance)
+        return finished(stance, file.source, file.package_dirs)
     if robot is None:
         raise click.UsageError(
             "no robot is named. Give ROBOT (a preset, or a URDF, MJCF or SDF file), or "
@@ -131,12 +167,7 @@ def read_stance(
             click.get_current_context(silent=True),
         )
     check_package_dirs(package_dirs)  # a preset looks none up
-    if sole_height is not None:
-        if contact_at == "sole":
-            raise InvalidInputError(
-                "--sole-height and --contact-at sole both say where the contacts are. Give one."
-            )
-        contact_at = "frame"  # moved by the height, and no farther
+    contact_at = place_at_height(contact_at, sole_height)
     # A preset is passed by name, so that its feet and posture come along.
     source = (
         robot
@@ -162,6 +193,7 @@ def read_stance(
             turns=turns,
             grounds=grounds,
             planes=planes,
+            frictions=frictions,
         ),
         contact_at=contact_at,
         soles=soles,
@@ -171,13 +203,25 @@ def read_stance(
         base_rpy=_read_rpy(base_yaw, base_rpy),
         width=width,
         drives=read_drives(load_robot(source), **drives) if any(drives.values()) else None,
+        locked=locked,
     )
     if not isinstance(source, Robot):
         echo_notes(stance.robot.notes)
     echo_notes(soles_read(stance))
-    return written(
-        put_loads(stance, loads, payloads), save_stance, robot, force_stance, package_dirs
-    )
+    return finished(stance, robot, package_dirs)
+
+
+def place_at_height(contact_at: Any, sole_height: float | None) -> Any:
+    """``--contact-at``, where ``--sole-height`` may say it instead: at the frame, and moved.
+
+    Raises:
+        InvalidInputError: both say where the contacts are.
+    """
+    if sole_height is not None and contact_at == "sole":
+        raise InvalidInputError(
+            "--sole-height and --contact-at sole both say where the contacts are. Give one."
+        )
+    return contact_at if sole_height is None else "frame"
 
 
 def _read_rpy(yaw: float | None, text: str | None) -> tuple[float, float, float] | None:

@@ -11,9 +11,10 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
+from copsense.cli.place_options import Course, read_course
 from copsense.cli.printing import echo_json, echo_notes, echo_written, progress_bar
-from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import TIME, read_range
+from copsense.cli.stance_options import read_stance, swept_stance_options
+from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -27,30 +28,11 @@ if TYPE_CHECKING:
     epilog="\b\nExamples:\n"
     "  copsense sweep icub --com-y -0.07:0.07:201 --output icub.nc\n"
     "  copsense sweep icub --com-y -30mm:30mm:61 --period 2s --output sway.nc\n"
+    "  copsense sweep icub --com-y -0.05:0.05:51 --com-x 0.01 --joint torso_yaw=20\n"
     "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv"
 )
-@stance_options
+@swept_stance_options
 @criterion_options
-@click.option(
-    "--com-x",
-    metavar="START:STOP:COUNT",
-    help="Sweep the CoM forwards, world x [m]; CoM y held over the contacts' middle.",
-)
-@click.option(
-    "--com-y",
-    metavar="START:STOP:COUNT",
-    help="Sweep the CoM sideways, world y [m]; CoM x held over the contacts' middle.",
-)
-@click.option(
-    "--com-z",
-    metavar="START:STOP:COUNT",
-    help="Sweep the CoM's height, world z [m]; CoM x and y held over the contacts' middle.",
-)
-@click.option(
-    "--joint",
-    metavar="NAME=START:STOP:COUNT",
-    help="Sweep a joint: degrees, or metres for a prismatic joint, or with units (0mm:200mm:3).",
-)
 @click.option(
     "--configurations",
     type=click.Path(),
@@ -79,7 +61,7 @@ def sweep(
     com_x: str | None,
     com_y: str | None,
     com_z: str | None,
-    joint: str | None,
+    joints: tuple[str, ...],
     configurations: str | None,
     period: float | None,
     output: str | None,
@@ -95,17 +77,23 @@ def sweep(
     from copsense.files import check_output
     from copsense.sweeps import sweep as evaluate
 
-    com = {"com_x": com_x, "com_y": com_y, "com_z": com_z}
-    if sum(what is not None for what in (*com.values(), joint, configurations)) != 1:
+    course = read_course(com_x, com_y, com_z, joints)
+    if len(course.swept) + (configurations is not None) != 1:
         raise InvalidInputError(
             "say what to sweep, one of: --com-x, --com-y or --com-z START:STOP:COUNT [m], "
-            "--joint NAME=START:STOP:COUNT, --configurations FILE."
+            "--joint NAME=START:STOP:COUNT, --configurations FILE. A single value holds."
+        )
+    if configurations is not None and course.holding:
+        raise InvalidInputError(
+            f"the rows of {configurations} say where every joint is, and so does "
+            f"{', '.join(course.holding)}. Leave one of them out."
         )
     if output is not None:
         check_output(output, suffixes=(".nc", ".csv"), overwrite=force)
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
-    path = _read_path(read_stance(robot, **options), com, joint, configurations)
+    stance = read_stance(robot, **course.places, **options)
+    path = _read_path(stance, course, configurations)
     with progress_bar(len(path), "criteria") as update:
         swept = evaluate(path, chosen, within, period=period, progress=update)
     swept = swept.with_attributes(command="copsense " + shlex.join(sys.argv[1:]))
@@ -127,25 +115,19 @@ def sweep(
     click.get_current_context().exit(1 if failures else 0)
 
 
-def _read_path(
-    stance: Stance, com: dict[str, str | None], joint: str | None, configurations: str | None
-) -> PosturePath:
+def _read_path(stance: Stance, course: Course, configurations: str | None) -> PosturePath:
     """The path that the options ask for."""
     from copsense.files import load_configurations
-    from copsense.path import com_sweep, joint_sweep, path_through
+    from copsense.path import COM_COORDINATES, com_sweep, joint_sweep, path_through
 
     if configurations is not None:
         rows = load_configurations(configurations)
         return path_through(stance.at(rows[0]), rows, strict=False)
-    for coordinate, text in com.items():
-        if text is not None:
-            start, stop, count = read_range(text, "m")
-            with progress_bar(max(count, 0), "postures") as update:
-                return com_sweep(stance, coordinate, start, stop, count, progress=update)
-    name, _, text = str(joint).partition("=")
-    start, stop, count = read_range(text, stance.robot.joint_unit(name))
+    (name,) = course.swept
+    start, stop, count = course.range_of(name, stance.robot)
+    make, held = com_sweep if name in COM_COORDINATES else joint_sweep, course.held(stance.robot)
     with progress_bar(max(count, 0), "postures") as update:
-        return joint_sweep(stance, name, start, stop, count, progress=update)
+        return make(stance, name, start, stop, count, held=held, progress=update)
 
 
 def _note_joints(swept: Sweep, robot: Robot) -> None:

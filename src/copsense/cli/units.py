@@ -8,7 +8,7 @@ frequencies, forces and moments are read likewise, bare in SI, but what turns in
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import click
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 else:  # not generic in click 8.1
     _ParamType = click.ParamType
 
-Unit = Literal["rad", "m", "s", "rad/s", "m/s", "Hz", "kg", "N", "Nm", "Ns"]
+Unit = Literal["rad", "m", "s", "rad/s", "m/s", "Hz", "kg", "N", "Nm", "Ns", "N/m"]
 
 
 class _Kind(NamedTuple):
@@ -66,6 +66,7 @@ _KINDS: dict[str, _Kind] = {
     "N": _Kind("force", "40 (N) or 40N", {"N": float}),
     "Nm": _Kind("moment", "30 (Nm) or 30Nm", {"Nm": float}),
     "Ns": _Kind("impulse", "2 (N s) or 2Ns", {"Ns": float}),
+    "N/m": _Kind("stiffness", "500 (N/m) or 500N/m", {"N/m": float}),
 }
 
 
@@ -117,12 +118,16 @@ def read_positions(texts: Iterable[str], robot: Robot) -> dict[str, float]:
 
     Raises:
         UnknownNameError: the robot has no such joint.
-        InvalidInputError: not an assignment, or a position in a unit that the joint has not.
+        InvalidInputError: not an assignment, a position in a unit that the joint has not, or a
+            joint twice.
     """
     form = "JOINT=POSITION, such as l_knee=-20 (degrees), l_knee=-0.35rad or slide=0.1 (metres)"
-    return {
-        name: read_quantity(value, robot.joint_unit(name)) for name, value in _pairs(texts, form)
-    }
+    found: dict[str, float] = {}
+    for name, value in _pairs(texts, form):
+        if name in found:
+            raise InvalidInputError(f"the position of joint {name} is given twice. Give it once.")
+        found[name] = read_quantity(value, robot.joint_unit(name))
+    return found
 
 
 def read_coordinates(texts: Iterable[str], stance: Stance) -> dict[str, float]:
@@ -166,6 +171,41 @@ def read_assignments(texts: Iterable[str], form: str, unit: Unit | None = None) 
                 f"{f'{name}={number}'!r} is not understood. Give {form}."
             ) from None
     return values
+
+
+def read_numbers(
+    value: str,
+    said: str,
+    form: str,
+    units: Sequence[Unit | None],
+    *,
+    least: int | None = None,
+) -> list[float]:
+    """``A:B:C`` as numbers in SI; None is the unit of a number without.
+
+    Args:
+        value: the numbers.
+        said: the whole option, for the error message.
+        form: how to write it.
+        units: of each number.
+        least: how many are needed; default all. Those left out are zero.
+
+    Raises:
+        InvalidInputError: too few or too many, or one that is not understood.
+    """
+    parts = value.split(":")
+    if len(parts) not in {least or len(units), len(units)}:
+        raise InvalidInputError(f"{said} is not understood. Give {form}.")
+    try:
+        numbers = [
+            float(part) if unit is None else read_quantity(part, unit)
+            for part, unit in zip(parts, units, strict=False)
+        ]
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{said}: {error}") from None
+    except ValueError:
+        raise InvalidInputError(f"{said} is not understood. Give {form}.") from None
+    return numbers + [0.0] * (len(units) - len(numbers))
 
 
 def split_assignment(text: str, form: str) -> tuple[str, str]:

@@ -69,6 +69,8 @@ class Case:
     def _parameters(self) -> dict[str, Any]:
         parts = ("robot", "posture", "controller", "trial", "conditions")
         found = {name: plain(getattr(self, name)) for name in parts}
+        if self.robot.tables is None:  # as in tables that were made before there were any
+            del found["robot"]["tables"]
         if files := self.robot.files:
             content = b"".join(file.read_bytes() for file in files)
             found["robot"]["content"] = hashlib.sha256(content).hexdigest()[:12]

@@ -9,7 +9,7 @@ from typing import Any
 
 from copsense.arrays import finite_number
 from copsense.contact import Contact, rectangle
-from copsense.content import freeze
+from copsense.content import freeze, plain
 from copsense.controllers import STIFF, Gains, public_gains
 from copsense.criterion import Criterion, criterion_named
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -58,6 +58,8 @@ class RobotChoice:
             from the collision geometry.
         sole_height: height of the contact plane above the model's frames, along its normal [m];
             for the contacts of `soles`.
+        tables: a whole stance as `copsense.robots.stance_data` writes it, paths said from the
+            working folder; instead of contacts, soles and sole height.
     """
 
     source: str
@@ -65,15 +67,16 @@ class RobotChoice:
     contacts: tuple[str, ...] = ()
     soles: Mapping[str, tuple[float, float, float, float]] | None = None
     sole_height: float = 0.0
+    tables: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         """Set the default name and validate the soles."""
         object.__setattr__(self, "name", self.name or Path(self.source).stem)
         object.__setattr__(self, "contacts", tuple(self.contacts))
-        freeze(self, "soles")
+        freeze(self, "soles", "tables")
         if self.is_stance and (self.contacts or self.soles or self.sole_height):
             raise InvalidInputError(
-                f"the stance file {self.source} says which contacts robot {self.name!r} has, and "
+                f"the stance of {self.source} says which contacts robot {self.name!r} has, and "
                 "so does another field. Leave contacts, soles and sole_height (--contact) out."
             )
         finite_number(self.sole_height, f"the sole height of robot {self.name!r} [m]")
@@ -86,8 +89,8 @@ class RobotChoice:
 
     @property
     def is_stance(self) -> bool:
-        """Whether the source is a stance file."""
-        return self.source.endswith(".toml")
+        """Whether a stance file says, or its tables, how the robot stands."""
+        return self.source.endswith(".toml") or self.tables is not None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -95,7 +98,7 @@ class RobotChoice:
         if self.source in PRESETS or not Path(self.source).is_file():
             return ()
         own = Path(self.source)
-        model = StanceFile.read(own).source if self.is_stance else ""
+        model = StanceFile.read(own).source if own.suffix == ".toml" else ""
         return (own, model) if isinstance(model, Path) and model.is_file() else (own,)
 
     def check_own(self, posture: PostureChoice) -> None:
@@ -106,7 +109,7 @@ class RobotChoice:
         """
         if self.is_stance and posture.changes:
             raise InvalidInputError(
-                f"the stance file {self.source} says how the robot stands, and so does posture "
+                f"the stance of {self.source} says how the robot stands, and so does posture "
                 f"{posture.name!r}. Use the posture own (--posture own)."
             )
 
@@ -118,6 +121,8 @@ class RobotChoice:
         """
         if self.is_stance:
             self.check_own(posture)
+            if self.tables is not None:
+                return StanceFile(Path("stance.toml"), plain(self.tables)).stance()
             return load_stance(self.source)
         robot: str | Robot = self.source
         if self.source not in PRESETS:

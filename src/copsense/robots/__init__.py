@@ -5,7 +5,7 @@ from copsense.robots.four_bar import four_bar_angles, four_bar_robot
 from copsense.robots.inspection import Inspection, inspect_robot
 from copsense.robots.plausibility import ImplausibleStanceWarning, plausibility_notes
 from copsense.robots.presets import PRESETS, Preset
-from copsense.robots.stance_file import StanceFile, save_stance
+from copsense.robots.stance_file import StanceFile, save_stance, stance_data
 from copsense.robots.standing import (
     StandingWarning,
     likely_feet,
@@ -34,5 +34,6 @@ __all__ = [
     "save_stance",
     "sole_notes",
     "soles_read",
+    "stance_data",
     "stand",
 ]

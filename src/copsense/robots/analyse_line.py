@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import shlex
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from copsense.contact import Contact, rectangle
 from copsense.content import freeze
+from copsense.drives import Drives
 from copsense.errors import CopsenseError
 from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt
@@ -19,6 +20,7 @@ from copsense.robots.feet import Foot
 from copsense.robots.plausibility import ImplausibleStanceWarning
 from copsense.robots.standing import load_stance
 from copsense.shapes import Geometry
+from copsense.stance import Stance
 
 _GUESSED = ((-0.08, 0.12), (-0.04, 0.04))  # m: a sole where none can be read
 
@@ -37,6 +39,10 @@ class AnalyseLine:
         posture: joint -> position [rad].
         package_dirs: as given.
         offsets: frame -> place of its contact in it [m], of points beside their frames.
+        given: options that the caller gave, word by word: of motors, springs and the like, and of
+            `own`.
+        own: the contacts that the caller gave, instead of `contacts`.
+        level_soles: ``--level-soles``, of `own`.
     """
 
     source: str
@@ -48,6 +54,9 @@ class AnalyseLine:
     posture: Mapping[str, float] = field(default_factory=dict)
     package_dirs: tuple[str, ...] = ()
     offsets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    given: tuple[str, ...] = ()
+    own: tuple[Contact, ...] = ()
+    level_soles: bool = False
 
     def __post_init__(self) -> None:
         """Own the posture and the offsets."""
@@ -56,6 +65,21 @@ class AnalyseLine:
     def __str__(self) -> str:
         """The line, quoted for a shell."""
         words = ["copsense", "analyse", self.source]
+        if not self.own:  # else they are among the words that were given
+            words += self._contact_words()
+        roll, pitch, yaw = self.base_rpy
+        if roll or pitch:
+            words.append(f"--base-rpy={roll:g}:{pitch:g}:{yaw:g}")
+        elif yaw:
+            words.append(f"--base-yaw={yaw:g}")
+        for joint, position in self.posture.items():
+            words += ["--posture", f"{joint}={math.degrees(position):g}"]
+        for folder in self.package_dirs:
+            words += ["--package-dir", folder]
+        return shlex.join([*words, *self.given])
+
+    def _contact_words(self) -> list[str]:
+        words: list[str] = []
         for contact in self.contacts:
             words += ["--contact", contact]
         for frame, place in self.offsets.items():
@@ -66,44 +90,76 @@ class AnalyseLine:
             words += ["--soles", self.soles]
         if self.sole is not None:
             words.append("--sole=" + ":".join(f"{edge:g}" for pair in self.sole for edge in pair))
-        roll, pitch, yaw = self.base_rpy
-        if roll or pitch:
-            words.append(f"--base-rpy={roll:g}:{pitch:g}:{yaw:g}")
-        elif yaw:
-            words.append(f"--base-yaw={yaw:g}")
-        for joint, position in self.posture.items():
-            words += ["--posture", f"{joint}={math.degrees(position):g}"]
-        for folder in self.package_dirs:
-            words += ["--package-dir", folder]
-        return shlex.join(words)
+        return words
+
+    def stand(self, robot: Robot | str, drives: Drives | None, locked: Sequence[str]) -> Stance:
+        """Stand as the command does for this line.
+
+        Args:
+            robot: the robot, or the name of a preset, whose feet and posture come along.
+            drives: what holds the joints, of a preset.
+            locked: its joints that are rigid.
+        """
+        return load_stance(
+            robot,
+            contacts=list(self.own) or self._contacts() or None,
+            contact_at=self.contact_at,
+            soles=self.soles,
+            level_soles=self.level_soles,
+            posture=self.posture,
+            base_rpy=np.radians(self.base_rpy) if any(self.base_rpy) else None,
+            drives=drives,
+            locked=locked,
+        )
+
+    def _contacts(self) -> list[Contact]:
+        found = []
+        for text in self.contacts:
+            frame, colon, _ = text.rpartition(":")
+            point = text.endswith(":point") and bool(colon)
+            contact = Contact(text)
+            if point:
+                offset = self.offsets.get(frame, (0.0, 0.0, 0.0))
+                contact = Contact(frame, kind="point", offset=offset)
+            if self.sole is not None and not point:
+                contact = Contact(text, polygon=rectangle(*self.sole))
+            found.append(contact)
+        return found
 
 
 def lines_to_try(
-    source: str,
-    feet: Sequence[Foot],
-    soles: Geometry,
-    base_rpy: tuple[float, float, float],
-    postures: Iterable[Mapping[str, float]],
-    package_dirs: tuple[str, ...],
+    start: AnalyseLine, feet: Sequence[Foot], postures: Iterable[Mapping[str, float]]
 ) -> Iterator[AnalyseLine]:
-    """Lines for these feet, the likeliest first."""
+    """Lines for these feet, or for the contacts that the caller gave, the likeliest first.
+
+    Args:
+        start: what all of them say.
+        feet: the feet that were found.
+        postures: joint -> position [rad].
+    """
     surfaces = [foot for foot in feet if foot.kind == "surface"]
     unread = any(foot.sole is None for foot in surfaces)
-    contacts = tuple(f.frame if f.kind == "surface" else f"{f.frame}:point" for f in feet)
-    at: ContactAt | None = "sole" if surfaces and not unread else None
-    sole = _GUESSED if unread else None
     offsets = {f.frame: f.contact.offset for f in feet if f.kind == "point"}
-    beside = {frame: offset for frame, offset in offsets.items() if any(offset)}
-    for posture in postures:
-        yield AnalyseLine(
-            source, contacts, at, soles, sole, base_rpy, posture, package_dirs, beside
+    if not start.own:
+        start = replace(
+            start,
+            contacts=tuple(f.frame if f.kind == "surface" else f"{f.frame}:point" for f in feet),
+            contact_at="sole" if surfaces and not unread else None,
+            sole=_GUESSED if unread else None,
+            offsets={frame: offset for frame, offset in offsets.items() if any(offset)},
         )
+    for posture in postures:
+        yield replace(start, posture=posture)
 
 
 def first_that_stands(
-    robot: Robot, lines: Iterable[AnalyseLine]
+    lines: Iterable[AnalyseLine], stand: Callable[[AnalyseLine], object]
 ) -> tuple[AnalyseLine | None, str, tuple[str, ...]]:
     """The first line by which the robot stands plausibly, else the first by which it stands.
+
+    Args:
+        lines: to be tried, in turn.
+        stand: lets the robot stand by a line, or raises a `CopsenseError`.
 
     Returns:
         The line or None, why there is none or "", and what was said when it stood.
@@ -113,7 +169,7 @@ def first_that_stands(
         try:
             with warnings.catch_warnings(record=True) as said:
                 warnings.simplefilter("always")
-                _stand(robot, line)
+                stand(line)
         except CopsenseError as error:
             reason = str(error)
             continue
@@ -122,25 +178,3 @@ def first_that_stands(
             return line, "", notes
         doubtful = doubtful or (line, "", notes)
     return doubtful or (None, reason, ())
-
-
-def _stand(robot: Robot, line: AnalyseLine) -> None:
-    """Stand as the command does for this line."""
-    contacts = []
-    for text in line.contacts:
-        frame, colon, _ = text.rpartition(":")
-        point = text.endswith(":point") and bool(colon)
-        contact = Contact(text)
-        if point:
-            contact = Contact(frame, kind="point", offset=line.offsets.get(frame, (0.0, 0.0, 0.0)))
-        if line.sole is not None and not point:
-            contact = Contact(text, polygon=rectangle(*line.sole))
-        contacts.append(contact)
-    load_stance(
-        robot,
-        contacts=contacts,
-        contact_at=line.contact_at,
-        soles=line.soles,
-        posture=line.posture,
-        base_rpy=np.radians(line.base_rpy) if any(line.base_rpy) else None,
-    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,11 +11,13 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.contact import Contact
 from copsense.content import ShortRepr
+from copsense.drives import Drives
 from copsense.json_data import json_data
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
-from copsense.robots.contact_soles import tip_text
+from copsense.robots.contact_soles import ContactAt, tip_text
 from copsense.robots.feet import Foot, find_feet
 from copsense.robots.heading import bent_knees, facing, straight_legs, upright_base
 from copsense.robots.presets import PRESETS
@@ -149,7 +151,17 @@ class Inspection(ShortRepr):
 
 
 def inspect_robot(
-    source: str | Path | Robot, *, package_dirs: Iterable[str | Path] = (), root: str | None = None
+    source: str | Path | Robot,
+    *,
+    package_dirs: Iterable[str | Path] = (),
+    root: str | None = None,
+    contacts: Sequence[Contact] | None = None,
+    contact_at: ContactAt | None = None,
+    soles: Geometry = "collision",
+    level_soles: bool = False,
+    drives: Drives | None = None,
+    locked: Sequence[str] = (),
+    given: Sequence[str] = (),
 ) -> Inspection:
     """Inspect a robot: its joints and motors, the feet found by geometry, and how it stands.
 
@@ -157,12 +169,28 @@ def inspect_robot(
         source: a preset's name, the path of a URDF, MJCF or SDF, or a `Robot`.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         root: body of the robot that is meant, where an MJCF holds several.
+        contacts: what it is to stand on, instead of the feet found by geometry.
+        contact_at: of these contacts, as `copsense.load_stance` takes it.
+        soles: likewise.
+        level_soles: likewise.
+        drives: what holds its joints, instead of what its file says.
+        locked: joints that are rigid, at zero.
+        given: how contacts, drives and locked joints are written as options of the command, which
+            the line repeats.
 
     Raises:
         CopsenseError: the robot cannot be loaded.
     """
     folders = tuple(map(str, package_dirs))
-    robot = load_robot(source, package_dirs=folders, root=root)
+    own = tuple(contacts or ())
+    robot = load_robot(
+        source,
+        package_dirs=folders,
+        root=root,
+        frames=[contact.frame for contact in own],
+        drives=drives,
+        locked=locked,
+    )
     named = str(source)
     if isinstance(source, Robot):
         path = None if source.description is None else source.description.path
@@ -172,20 +200,37 @@ def inspect_robot(
     turn = _base_turn(robot, rest)
     q = _turned(robot, rest, turn)
     feet, notes = find_feet(robot, q, "collision")
-    soles: Geometry = "collision"
+    geometry: Geometry = "collision"
     if not any(foot.sole is not None or foot.kind == "point" for foot in feet):
         drawn, said = find_feet(robot, q, "visual") if robot.mjcf is None else ((), ())
         if any(foot.sole is not None or foot.kind == "point" for foot in drawn):
-            feet, soles, notes = drawn, "visual", said
+            feet, geometry, notes = drawn, "visual", said
             notes += (
                 "no collision geometry was found under its feet; what is drawn is read instead "
                 "(--soles visual).",
             )
     heading, why = facing(robot, q, feet)
+    start = AnalyseLine(
+        named,
+        contact_at=contact_at if own else None,
+        soles=soles if own else geometry,
+        package_dirs=folders,
+        given=tuple(given),
+        own=own,
+        level_soles=level_soles,
+    )
     if named in PRESETS:
-        line: AnalyseLine | None = AnalyseLine(named)
-        return Inspection(robot, joints, feet, heading, why, line, "", (*robot.notes, *notes))
-    if any(foot.kind == "surface" and foot.sole is None for foot in feet):
+        start = replace(start, soles=soles)  # its contacts are known
+        found: AnalyseLine | None = start
+        reason = ""
+        if own or drives is not None or locked:
+            # A preset by name: its posture comes along.
+            found, reason, told = first_that_stands(
+                [start], lambda line: line.stand(named, drives, locked)
+            )
+            notes += tuple(note for note in told if note not in notes)
+        return Inspection(robot, joints, feet, heading, why, found, reason, (*robot.notes, *notes))
+    if not own and any(foot.kind == "surface" and foot.sole is None for foot in feet):
         notes += (
             "no sole can be read under its feet: the rectangle of --sole is a guess. Measure it: "
             "X0:X1:Y0:Y1 in the frame's axes [m].",
@@ -195,8 +240,8 @@ def inspect_robot(
         bent_knees(robot, q, legs, heading or 0.0, np.radians(bend)) for bend in _BENDS if legs
     ]
     rpy = (turn[0], turn[1], (360.0 - (heading or 0.0)) % 360.0)
-    lines = lines_to_try(named, feet, soles, rpy, [*bent, {}], folders)
-    found, reason, said = first_that_stands(robot, lines)
+    lines = lines_to_try(replace(start, base_rpy=rpy), feet, [*bent, {}])
+    found, reason, said = first_that_stands(lines, lambda line: line.stand(robot, None, ()))
     if found is None:  # else it was said when the robot stood
         said = tuple(tip_text(f.contact, f.sole) for f in feet if f.sole and f.sole.is_tip)
     notes += tuple(note for note in said if note not in notes)

@@ -22,6 +22,7 @@ import numpy as np
 import tomli_w
 
 from copsense.arrays import finite_array, finite_number
+from copsense.drives import Drives
 from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError
 from copsense.files import check_output, write_beside
 from copsense.loads import Load, SpringLoad
@@ -39,7 +40,7 @@ from copsense.robots.stance_tables import (
     read_drives,
     read_loads,
     read_payload,
-    read_posture,
+    read_positions,
     table_of,
     truth,
 )
@@ -59,6 +60,12 @@ _STANDING = (
     "posture_deg",
     "posture_rad",
     "posture_m",
+    "com_x_m",
+    "com_y_m",
+    "com_z_m",
+    "joints_deg",
+    "joints_rad",
+    "joints_m",
 )
 _KEYS = (
     "robot",
@@ -82,7 +89,7 @@ class StanceFile:
     """What a stance file says.
 
     Attributes:
-        path: of the file.
+        path: of the file; its folder is the one from which paths are said.
         data: its tables.
     """
 
@@ -122,6 +129,11 @@ class StanceFile:
         return robot if robot in PRESETS else self.path.parent / robot
 
     @property
+    def package_dirs(self) -> list[Path]:
+        """Folders of its meshes' packages, as seen from here."""
+        return [self.path.parent / str(each) for each in self.data.get("package_dirs", [])]
+
+    @property
     def limits(self) -> Limits | None:
         """The limits in the file, or None where it has none."""
         from copsense.limits import Limits
@@ -154,25 +166,16 @@ class StanceFile:
             raise
 
     def _stance(self) -> Stance:
-        from copsense.posture import carry_payload
+        from copsense.posture import carry_payload, move_stance
         from copsense.robots.standing import load_robot, load_stance
 
-        data = self.data
-        folders = [self.path.parent / str(each) for each in data.get("package_dirs", [])]
+        data, folders = self.data, self.package_dirs
         contacts = [
             read_contact(table_of(each, "contacts"))
             for each in list_of(data.get("contacts", []), "contacts")
         ]
-        robot = load_robot(
-            self.source, package_dirs=folders, frames=[contact.frame for contact in contacts]
-        )
-        if "drives" in data:
-            robot = robot.with_drives(read_drives(table_of(data["drives"], "drives")))
-        if "locked" in data:
-            locked = set(map(str, data["locked"]))
-            for joint in locked:
-                robot.joint_id(joint)
-            robot = robot.keeping(joint for joint in robot.joint_names if joint not in locked)
+        drives = read_drives(table_of(data["drives"], "drives")) if "drives" in data else None
+        locked = list(map(str, list_of(data.get("locked", []), "locked")))
         payloads = [read_payload(each) for each in list_of(data.get("payloads", []), "payloads")]
         loads = read_loads(data)
         if "configuration" in data:
@@ -182,26 +185,40 @@ class StanceFile:
                     f"{', '.join(beside)} {'says' if len(beside) == 1 else 'say'} how to stand up, "
                     "and the [configuration] where every joint is. Leave one out."
                 )
+            robot = load_robot(
+                self.source,
+                package_dirs=folders,
+                frames=[contact.frame for contact in contacts],
+                drives=drives,
+                locked=locked,
+            )
             for payload in payloads:
                 robot = robot.with_payload(**payload)
             q = read_configuration(robot, table_of(data["configuration"], "configuration"))
             return Stance(robot, q, tuple(contacts), loads=tuple(loads))
-        preset = isinstance(self.source, str) and not {"drives", "locked"} & set(data)
         rpy = data.get("base_rpy_deg")
         stance = load_stance(
-            self.source if preset else robot,
+            self.source,
             contacts=contacts or None,
-            posture=read_posture(data),
+            posture=read_positions(data, "posture"),
             base_rpy=None if rpy is None else np.radians(finite_array(rpy, "base_rpy_deg", (3,))),
             width=None if "width_m" not in data else finite_number(data["width_m"], "width_m"),
             contact_at=data.get("contact_at"),
             soles=data.get("soles", "collision"),
             level_soles=truth(data.get("level_soles", False), "level_soles"),
             package_dirs=folders,
+            drives=drives,
+            locked=locked,
         )
         for payload in payloads:
             stance = carry_payload(stance, payload["frame"], payload["mass"], com=payload["com"])
-        return stance.with_loads(loads) if loads else stance
+        com = {
+            key.removesuffix("_m"): finite_number(data[key], key)
+            for key in ("com_x_m", "com_y_m", "com_z_m")
+            if key in data
+        }
+        loaded = stance.with_loads(loads) if loads else stance
+        return move_stance(loaded, **com, joints=read_positions(data, "joints"))
 
 
 def save_stance(
@@ -232,22 +249,56 @@ def save_stance(
         OutputError: the file cannot be written, or is there already.
         InvalidInputError: where the robot came from is not known, or is another robot.
     """
-    from copsense.robots.standing import load_robot
-
     check_at_rest(stance, "a stance file")
     target = check_output(path, suffixes=(".toml",), overwrite=overwrite)
+    data = stance_data(
+        stance,
+        target.resolve().parent,
+        robot=robot,
+        package_dirs=package_dirs,
+        limits=limits,
+        criteria=criteria,
+    )
+    text = tomli_w.dumps(data, multiline_strings=False)
+    write_beside(target, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def stance_data(
+    stance: Stance,
+    folder: Path,
+    *,
+    robot: str | Path | None = None,
+    package_dirs: Iterable[str | Path] = (),
+    limits: Limits | None = None,
+    criteria: Sequence[Criterion] = (),
+) -> dict[str, Any]:
+    """What `save_stance` writes, as `StanceFile` holds it.
+
+    Args:
+        stance: what to write.
+        folder: that of the file, from which paths are said.
+        robot: as `save_stance` takes it.
+        package_dirs: likewise.
+        limits: likewise.
+        criteria: likewise.
+
+    Raises:
+        InvalidInputError: where the robot came from is not known, or is another robot.
+    """
+    from copsense.robots.standing import load_robot
+
     source = _source_of(stance.robot) if robot is None else str(robot)
-    folders = [str(folder) for folder in package_dirs]
+    folders = [str(each) for each in package_dirs]
     frames = [contact.frame for contact in stance.contacts]
     plain = load_robot(source, package_dirs=folders, frames=frames)
-    data: dict[str, Any] = {"robot": source if source in PRESETS else _beside(source, target)}
+    data: dict[str, Any] = {"robot": source if source in PRESETS else _beside(source, folder)}
     if folders:
-        data["package_dirs"] = [_beside(folder, target) for folder in folders]
-    kept = set(stance.robot.joint_names)
+        data["package_dirs"] = [_beside(each, folder) for each in folders]
+    own_drives, kept = plain.drives, set(stance.robot.joint_names)
     locked = [joint for joint in plain.joint_names if joint not in kept]
     if locked and kept.issubset(plain.joint_names):
         data["locked"] = locked
-        plain = plain.keeping(kept)
+        plain = plain.with_drives(Drives()).keeping(kept)
     for payload in stance.robot.payloads:
         plain = plain.with_payload(payload.frame, payload.mass, com=payload.com)
     if not _same_model(plain, stance.robot):
@@ -256,7 +307,7 @@ def save_stance(
             "joints or masses differ. Give robot=, the file that holds it."
         )
     data["configuration"] = configuration_data(stance)
-    if stance.robot.drives or plain.drives:  # empty: none, whatever the robot's file says
+    if stance.robot.drives or own_drives:  # empty: none, whatever the robot's file says
         data["drives"] = drives_data(stance.robot.drives)
     if limits is not None:
         table = {k: "off" if v is None else v for k, v in limits.to_dict().items()}
@@ -269,9 +320,7 @@ def save_stance(
     data["contacts"] = [contact_data(contact) for contact in stance.contacts]
     for key, kind in (("loads", Load), ("spring_loads", SpringLoad)):
         data[key] = [load_data(load) for load in stance.loads if isinstance(load, kind)]
-    data = {k: v for k, v in data.items() if k == "drives" or v not in ([], {})}
-    text = tomli_w.dumps(data, multiline_strings=False)
-    write_beside(target, lambda file: file.write_text(text, encoding="utf-8"))
+    return {k: v for k, v in data.items() if k == "drives" or v not in ([], {})}
 
 
 def _source_of(robot: Robot) -> str:
@@ -286,9 +335,9 @@ def _source_of(robot: Robot) -> str:
     return str(path)
 
 
-def _beside(source: str, target: Path) -> str:
+def _beside(source: str, folder: Path) -> str:
     """A path as seen from the stance file's folder, where one leads there."""
-    path, folder = Path(source).resolve(), target.resolve().parent
+    path = Path(source).resolve()
     try:
         return path.relative_to(folder, walk_up=True).as_posix()  # type: ignore[call-arg]
     except (TypeError, ValueError):  # walk_up is of Python 3.12

@@ -58,11 +58,18 @@ def read_configuration(robot: Robot, data: Mapping[str, Any]) -> np.ndarray:
     return q
 
 
-def read_posture(data: Mapping[str, Any]) -> dict[str, float]:
-    """``[posture_deg]``, ``_rad`` and ``_m``: joint -> position [rad, or m]."""
+def read_positions(data: Mapping[str, Any], name: str) -> dict[str, float]:
+    """``[NAME_deg]``, ``_rad`` and ``_m``: joint -> position [rad, or m].
+
+    Raises:
+        InvalidInputError: a joint in two of them, or no number.
+    """
     found: dict[str, float] = {}
-    for key, size in (("posture_deg", np.pi / 180), ("posture_rad", 1.0), ("posture_m", 1.0)):
+    for unit, size in (("deg", np.pi / 180), ("rad", 1.0), ("m", 1.0)):
+        key = f"{name}_{unit}"
         for joint, value in table_of(data.get(key, {}), key).items():
+            if joint in found:
+                raise InvalidInputError(f"{key} says where joint {joint} is again. Say it once.")
             found[joint] = finite_number(value, f"{key}.{joint}") * float(size)
     return found
 

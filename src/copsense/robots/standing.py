@@ -12,7 +12,13 @@ import pinocchio as pin
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import check_type, checked_positions, finite_array, finite_number
+from copsense.arrays import (
+    check_type,
+    checked_positions,
+    checked_tuple,
+    finite_array,
+    finite_number,
+)
 from copsense.closing import close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
@@ -46,6 +52,7 @@ def load_robot(
     root: str | None = None,
     drives: Drives | None = None,
     passive: Iterable[str] = (),
+    locked: Iterable[str] = (),
 ) -> Robot:
     """A robot from a preset's name, a URDF, MJCF or SDF (path or text), or a ``pin.Model``.
 
@@ -57,6 +64,7 @@ def load_robot(
         root: name of a body of the robot that is meant, where an MJCF holds several.
         drives: what holds its joints, instead of what its file says.
         passive: joints without a motor, beside those that have none already.
+        locked: joints that are rigid, at zero.
 
     Raises:
         UnknownNameError: neither a preset nor a file, or no body is named `root`, or drives are
@@ -68,7 +76,11 @@ def load_robot(
     robot = _read(source, package_dirs, frames, root)
     if drives is not None:
         robot = robot.with_drives(drives)
-    return robot.without_motors(passive) if passive else robot
+    robot = robot.without_motors(passive) if passive else robot
+    rigid = set(checked_tuple(locked, str, "name", 'Give joints, such as ["l_elbow"].'))
+    for joint in rigid:
+        robot.joint_id(joint)  # that it exists
+    return robot.keeping(j for j in robot.joint_names if j not in rigid) if rigid else robot
 
 
 def _read(
@@ -109,6 +121,7 @@ def load_stance(
     package_dirs: Iterable[str | Path] = (),
     drives: Drives | None = None,
     passive: Iterable[str] = (),
+    locked: Iterable[str] = (),
 ) -> Stance:
     """A robot standing on its contacts, its CoM over their middle, the middle at the origin.
 
@@ -136,6 +149,7 @@ def load_stance(
         package_dirs: folders that hold the packages of ``package://`` meshes.
         drives: what holds the robot's joints, instead of what its file says.
         passive: joints without a motor, beside those that have none already.
+        locked: joints that are rigid, at zero.
 
     Raises:
         CopsenseError: anything wrong with the input, or no posture that stands.
@@ -146,7 +160,7 @@ def load_stance(
         raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
     if isinstance(source, str | Path) and str(source).endswith(".toml"):
         given = (contacts, posture, base_rpy, width, contact_at, drives)
-        if level_soles or passive or any(value is not None for value in given):
+        if level_soles or passive or locked or any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
                 "argument. Change the file, or leave the argument out."
@@ -161,6 +175,7 @@ def load_stance(
         frames=_frames(contacts),
         drives=drives,
         passive=passive,
+        locked=locked,
     )
     if contacts is None:
         if preset is None:
@@ -178,7 +193,8 @@ def load_stance(
         check_type(contacts, Iterable, "a list of contacts", remedy)
         known = {c.frame: c for c in preset.contacts} if preset else {}
         chosen = tuple(_contact(c, known) for c in contacts)
-    own = preset.posture if preset else {}
+    moving = set(robot.joint_names)  # a preset's joint may be locked
+    own = {j: at for j, at in (preset.posture if preset else {}).items() if j in moving}
     wanted = checked_positions(posture, "the posture's joints")
     q = robot.configuration({**rest_positions(robot), **own, **wanted})
     q = close(robot, q, held=wanted or own)
