@@ -112,7 +112,7 @@ def test_what_options_say_is_the_same_when_it_is_read(robot, tmp_path, seed):
     [
         ("icub", ("--com-y", "0.03", "--com-x", "5mm", "--joint", "l_elbow=30")),
         ("icub", ("--com-z", "0.49", "--load", "l_hand=0:0:-20", "--along", "l_hip_roll")),
-        ("four_bar", ("--com-y", "0.02", "--payload", "rod=2")),
+        ("four_bar", ("--com-y", "0.02", "--contact-friction", "l_sole=0.5")),
         ("solo12", ("--com-x", "0.01", "--com-y", "-0.01", "--lock", "FL_HAA")),
         ("rods", (*FEET, *BENT, *LOOP, "--lock", "r_crank", "--com-y", "0.02")),
     ],

@@ -273,6 +273,8 @@ def _stances(
     file, (source,) = remembered_stance(), robots
     for text in words:
         choice = _posture(text)
+        if file is not None:
+            RobotChoice(source).check_own(choice)
         angles = [f"{joint}={angle!r}rad" for joint, angle in choice.angles(source).items()]
         options = dict(standing, posture=(*angles, *placed))
         if choice.width is not None:
