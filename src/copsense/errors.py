@@ -106,7 +106,7 @@ class UnbalancedError(CopsenseError):
         super().__init__(
             f"nothing can hold {robot!r} at this posture: {told} (Nm, or N along a slide), for "
             "want of a motor. Give the joint a motor, a spring or a held torque, let it hang at "
-            "its own equilibrium, or add a contact."
+            "its own equilibrium (solve_posture finds it), or add a contact."
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

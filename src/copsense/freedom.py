@@ -7,6 +7,7 @@ import numpy as np
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
 from copsense.stance import RANK_TOLERANCE, Stance
+from copsense.unheld import moved_joints
 
 _AXES = (
     "along x",
@@ -98,7 +99,7 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
 def freedom_notes(stance: Stance) -> tuple[str, ...]:
     """What the contacts hold twice, or hold that one would expect to move; empty where nothing."""
-    rows, repeated = len(stance.constraints), closure_notes(stance)
+    rows, repeated = len(stance.constraints), (*closure_notes(stance), *hanging_notes(stance))
     if stance.rank == rows:
         return repeated
     held = [f"CoM's {'xyz'[axis]}" for axis in held_com_axes(stance) if axis < 2]
@@ -128,6 +129,22 @@ def closure_notes(stance: Stance) -> tuple[str, ...]:
         f"Loops and couplings all but repeat what the contacts hold (smallest singular value "
         f"{least:.1e}): links and ground that yield by a little share the forces between them "
         "otherwise than these rigid ones, and feet may creep.",
+    )
+
+
+def hanging_notes(stance: Stance) -> tuple[str, ...]:
+    """What no motor, contact, loop or coupling holds, and whether it would stay; empty for none."""
+    motions = stance.hanging_motions
+    if not motions.shape[1]:
+        return ()
+    names = moved_joints(stance.robot, motions)
+    it = "it" if len(names) == 1 else "they"
+    stiffness = stance.hanging_derivative @ motions
+    least = float(np.linalg.eigvalsh((stiffness + stiffness.T) / 2)[0])
+    fall = f" But {it} would fall at the least touch (stiffness {least:.3g} Nm/rad)."
+    return (
+        f"No motor holds {', '.join(names)}: {it} hang{'s' * (it == 'it')} where gravity and "
+        f"springs leave a rest, and every posture follows.{fall if least <= 0.0 else ''}",
     )
 
 

@@ -15,6 +15,7 @@ from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
 from copsense.stance import RANK_TOLERANCE, Stance, check_at_rest, check_stance
+from copsense.unheld import moved_joints
 
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 _STATIONARITY = 1e-11  # on the cost's gradient along the manifold
@@ -128,13 +129,13 @@ def solve_posture(
     selector = np.eye(robot.model.nv)[columns]
     axes = [i for i, _ in wanted]
 
-    here, multipliers, hanging = stance, None, list(stance.hanging)
+    here, multipliers = stance, None
     for iteration in range(_MAX_ITERATIONS):
         # h(q) = 0: contacts, centre of mass, joints; C = dh/dq.
         h = np.concatenate(
             [
                 constraint_error(here, places),
-                here.balance[hanging] / robot.weight,
+                here.hanging_balance / robot.weight,
                 [here.com[i] - value for i, value in wanted],
                 [robot.joint_position(here.q, joint) - angle for joint, angle in joints.items()],
             ]
@@ -153,7 +154,7 @@ def solve_posture(
             of_h = multipliers if spread is None else (spread @ multipliers)[: len(h)]
             rows = len(here.constraints)
             pull = np.zeros(3)
-            start = rows + len(hanging)
+            start = rows + len(swing)
             pull[axes] = of_h[start : start + len(axes)]
             hessian = hessian + here.curvature(-of_h[:rows], -pull / robot.mass)
         K = _bordered(hessian, A)
@@ -272,11 +273,11 @@ def pull_back(stance: Stance, targets: Sequence[pin.SE3]) -> Stance:
     Raises:
         UnreachablePostureError: they cannot be brought there.
     """
-    here, model, hanging = stance, stance.robot.model, list(stance.hanging)
+    here, model = stance, stance.robot.model
     for _ in range(_MAX_ITERATIONS):
         error, rows = constraint_error(here, targets), here.constraints
-        if hanging:
-            swing = here.balance[hanging] / here.robot.weight
+        if here.hanging_motions.shape[1]:
+            swing = here.hanging_balance / here.robot.weight
             error = np.concatenate([error, swing])
             rows = np.vstack([rows, here.hanging_derivative / here.robot.weight])
         if np.abs(error).max() < TOLERANCE / 10:
@@ -308,12 +309,15 @@ def constraint_error(stance: Stance, targets: Sequence[pin.SE3]) -> Float[np.nda
 
 
 def _carried(multipliers: np.ndarray, before: Stance, after: Stance) -> np.ndarray:
-    """Multipliers of one iterate in the rows of the next: those of loops have a new basis."""
-    if before.closures is None or after.closures is None:
-        return multipliers
-    m, r = len(before.row_names), before.closures.basis.shape[1]
-    own = after.closures.basis.T @ (before.closures.basis @ multipliers[m : m + r])
-    return np.concatenate([multipliers[:m], own, multipliers[m + r :]])
+    """Multipliers of one iterate in the rows of the next: loops and what hangs have a new basis."""
+    m, own = len(before.row_names), np.zeros(0)
+    r = m
+    if before.closures is not None and after.closures is not None:
+        r += before.closures.basis.shape[1]
+        own = after.closures.basis.T @ (before.closures.basis @ multipliers[m:r])
+    k = r + before.hanging_motions.shape[1]
+    swing = after.hanging_motions.T @ (before.hanging_motions @ multipliers[r:k])
+    return np.concatenate([multipliers[:m], own, swing, multipliers[k:]])
 
 
 def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
@@ -416,8 +420,11 @@ def _what_remains(
     if stance.closures is not None:
         open_ = "a loop or coupling of the robot remains {:.2e} m or rad open"
         labels += [open_] * stance.closures.basis.shape[1]
-    names = stance.robot.velocity_names
-    labels += [f"{names[i]}, which hangs, lacks {{:.2e}} m of the weight" for i in stance.hanging]
+    labels += [
+        f"what hangs of {', '.join(moved_joints(stance.robot, motion[:, None]))} lacks {{:.2e}} m "
+        "of the weight"
+        for motion in stance.hanging_motions.T
+    ]
     labels += [f"the CoM's {'xyz'[i]} remains {{:.2e}} m off" for i in axes]
     labels += [f"joint {joint} remains {{:.2e}} (rad or m) off" for joint in joints]
     worst = int(np.argmax(np.abs(h)))

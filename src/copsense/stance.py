@@ -18,7 +18,7 @@ from scipy.linalg import block_diag, lapack
 from copsense import rigid_body
 from copsense.arrays import array_property, check_type, read_only
 from copsense.closures import RANK as CLOSURE_RANK
-from copsense.closures import Closures, joined
+from copsense.closures import Closures
 from copsense.contact import COMPONENT_NAMES, Contact, Plane
 from copsense.errors import (
     ContactGeometryError,
@@ -32,6 +32,7 @@ from copsense.motion import Motion
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 from copsense.row_space import RowSpace
+from copsense.unheld import unheld_motions
 
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost. A
 # posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
@@ -40,6 +41,9 @@ RANK_TOLERANCE = 1e-6
 # Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
 _CURVED = 1e-4
 _ROUNDING = 1e-13  # of the largest column of J: what is smaller moves no contact and no loop
+# How fast, per unit of motion, contacts and loops come to hold what they leave free at a posture.
+_PASSING = 1e-3
+_INDIFFERENT = 1e-7  # m, of the weight: a motion whose balance changes less hangs nowhere
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
 _HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
 _LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
@@ -326,33 +330,56 @@ class Stance:
         tolerance = RANK_TOLERANCE if self.closures is None else CLOSURE_RANK
         return RowSpace(self.constraints, tolerance, least=1.0)
 
-    @cached_property
-    def hanging(self) -> tuple[int, ...]:
-        """Velocities of joints that neither motor, contact nor loop holds: they hang.
-
-        Only gravity, loads, springs and held torques act on them, which `balance` must be zero of.
-        """
-        robot, model = self.robot, self.robot.model
-        if robot.actuation is None:
-            return ()
-        # By what carries what: a rod that comes to lie along an axis is held by its loop still.
-        supports = [set(model.supports[i]) for i in range(model.njoints)]
-        held = set().union(*(self.limb(contact) for contact in self.contacts))
-        for pair in joined(robot):
-            held |= supports[pair.a.joint] ^ supports[pair.b.joint]
-        for coupling in robot.drives.couplings:
-            held |= {robot.joint_id(coupling.joint), robot.joint_id(coupling.of)}
-        idle = np.asarray(~robot.actuation.matrix.astype(bool).any(axis=1))
-        for i in held - {0, 1}:
-            start = model.joints[i].idx_v - robot.base_nv
-            idle[start : start + model.joints[i].nv] = False
-        return tuple(int(i) + robot.base_nv for i in np.flatnonzero(idle))
-
     @array_property
+    def unheld_motions(self) -> Float[np.ndarray, "nv u"]:
+        """Orthonormal motions u that no motor, contact, loop or coupling holds (nv, u).
+
+        At rest u' N = 0, for only weight, loads, springs and held torques act along them.
+        """
+        if self.robot.actuation is None:
+            return np.zeros((self.robot.model.nv, 0))
+        return unheld_motions(self.robot, self.constraints)
+
+    @property
+    def hanging_motions(self) -> Float[np.ndarray, "nv h"]:
+        """Those unheld motions along which the posture decides whether the robot is at rest.
+
+        Without what is at rest anywhere, such as a rod that spins about its own axis, and without
+        what is free to first order only, such as a rod that lies along an axis of its joint.
+        """
+        return self._hanging[0]
+
+    @property
+    def hanging_balance(self) -> Float[np.ndarray, " h"]:
+        """u' N along `hanging_motions`: zero at rest [Nm, N, per unit of motion]."""
+        return np.asarray(self.hanging_motions.T.dot(self.balance))
+
+    @property
     def hanging_derivative(self) -> Float[np.ndarray, "h nv"]:
-        """d balance/dq of the joints that hang (h, nv): a motion must leave them at rest."""
-        still = np.zeros(len(self.constraints))
-        return self.balance_derivative(still)[list(self.hanging)]
+        """d(u' N)/dq along `hanging_motions` (h, nv): a motion must leave them at rest."""
+        return self._hanging[1]
+
+    @cached_property
+    def _hanging(self) -> tuple[np.ndarray, np.ndarray]:
+        U, robot = self.unheld_motions, self.robot
+        if U.shape[1]:
+            # With forces f that balance what they can, u turns with the posture so that
+            # d(u' N) = u' A: u' J' = 0 stays, hence du' J' f = -u' dJ' f.
+            nb = robot.unactuated_nv
+            E, N = robot.by_drive(self.constraints.T)[:nb], robot.by_drive(self.balance)[:nb]
+            left, s, right = np.linalg.svd(E)
+            count = nb - U.shape[1]
+            f = right[:count].T @ ((left[:, :count].T @ N) / s[:count])
+            Y = right[count:].T
+            if Y.shape[1]:  # u that some motion lets forces Y hold is free to first order only
+                Z = self._motions.null
+                held = [(Y.T @ self.motion_derivative(u) @ Z).ravel() for u in U.T]
+                _, s, vt = np.linalg.svd(np.array(held).T)
+                U = U @ vt[int(np.sum(s > _PASSING)) :].T
+            A = self.balance_derivative(f)
+            left, s, _ = np.linalg.svd(U.T @ A, full_matrices=False)
+            U = U @ left[:, s > _INDIFFERENT * robot.weight]
+        return read_only(U), read_only(U.T @ A if U.shape[1] else np.zeros((0, robot.model.nv)))
 
     @property
     def rank(self) -> int:
@@ -363,14 +390,14 @@ class Stance:
     def admissible_motions(self) -> Float[np.ndarray, "nv p"]:
         """Orthonormal basis Z of the velocities that move no contact and open no loop: J Z = 0.
 
-        Without the `false_motions`, which J alone would allow. Joints that hang follow as gravity
-        and their springs tell them.
+        Without the `false_motions`, which J alone would allow. What hangs follows as gravity and
+        springs tell it.
         """
         Z = self._motions.null
         count = self.false_motions.shape[1]
         if count:
             Z = Z @ np.linalg.svd(self.false_motions.T @ Z)[2][count:].T
-        if not self.hanging:
+        if not self.hanging_motions.shape[1]:
             return Z
         rows = self.hanging_derivative @ Z
         _, s, vt = np.linalg.svd(rows)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from controllers.test_driven_controller import CASES
 from statics.test_driven_statics import LOADS, rods
-from support.driven_robots import everything, rod_biped_model, rod_drives, standing
+from support.driven_robots import everything, hand_in_hand, rod_biped_model, rod_drives, standing
 
 import copsense
 from copsense import Load, Robot, Stance
@@ -36,9 +36,12 @@ SETTLED = 1e-3
 CLOSED = 2e-6  # m, rad: how far loops are open, soft as the engine has them
 
 
-@pytest.mark.parametrize("name", ["pinned rods", "five bars", "sprung ankles", "all at once"])
+AT_REST = ["pinned rods", "five bars", "sprung ankles", "all at once", "hand in hand"]
+
+
+@pytest.mark.parametrize("name", AT_REST)
 def test_at_rest_forces_and_torques_are_the_statics(name):
-    stance = CASES[name]()
+    stance = hand_in_hand() if name == "hand in hand" else CASES[name]()
     static = copsense.solve_equilibrium(stance, C2)
     recording = rollout(MujocoSimulator(stance), BalancingController(stance, C2), Scenario(0.12))
     assert recording.attrs["end_kind"] == "completed", recording.attrs["end_reason"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from copsense import Contact, Robot, Stance, solve_posture
+from copsense import Contact, Robot, Stance, load_robot, load_stance, solve_posture
 from copsense.closing import close
 from copsense.drives import Coupling, Drives, Loop, Spring, Transmission
 
@@ -163,3 +163,13 @@ def five_bars() -> Stance:
     q = close(robot, robot.configuration(angles), [name for name in angles if "rod" not in name])
     contacts = [Contact(f"{leg}_front_tip", kind="point") for leg in legs]
     return solve_posture(Stance(robot, q, contacts, False), com=(0.01, 0.004, None)).stance
+
+
+def hand_in_hand() -> Stance:
+    """The iCub with its hands on one ball, and no motor in its arms: five motions hang."""
+    robot = load_robot("icub")
+    idle = ("shoulder", "elbow")
+    motors = tuple(n for n in robot.dof_names if not any(word in n for word in idle))
+    return load_stance(
+        "icub", drives=Drives(motors=motors, loops=(Loop("l_hand", "r_hand", "ball"),))
+    )

@@ -25,9 +25,9 @@ from scipy.linalg import lapack
 
 from copsense.controllers.driven_dynamics import DrivenDynamics
 from copsense.controllers.sharing import ShareLoad
-from copsense.controllers.unheld import unheld_motions, vanishing
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance
+from copsense.unheld import vanishing
 
 _RANK = 1e-5  # pivots, relative, under which a constraint says what others say
 _CALM = 20.0  # 1/s: how fast motions that no motor holds are to come to rest
@@ -43,7 +43,7 @@ class DrivenTorques:
         """Count the motions that no motor holds."""
         self._robot, self._dynamics = stance.robot, dynamics
         self._nb = stance.robot.unactuated_nv
-        self._free = unheld_motions(stance).shape[1]
+        self._free = stance.unheld_motions.shape[1]
 
     def inertia(self) -> Float[np.ndarray, " k"]:
         """What each motor alone accelerates, base free and loops closed (k,); 0 if held fast."""

@@ -20,7 +20,7 @@ from copsense.controllers import (
 )
 from copsense.criterion import Criterion, check_criterion, minimum_torque
 from copsense.errors import InvalidInputError
-from copsense.freedom import closure_notes
+from copsense.freedom import closure_notes, hanging_notes
 from copsense.limits import Limits, check_limits
 from copsense.simulation.control_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
@@ -107,7 +107,7 @@ def balance(
         progress=progress,
         stop=stop,
     )
-    recording = recording.with_notes((*notes, *closure_notes(stance)))
+    recording = recording.with_notes((*notes, *closure_notes(stance), *hanging_notes(stance)))
     return recording if prediction is None else prediction.attach(recording)
 
 

@@ -37,7 +37,7 @@ from copsense.limits import LimitRows, Limits, limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
-from copsense.statics.equilibrium import StaticEquilibrium
+from copsense.statics.equilibrium import StaticEquilibrium, require_balance
 from copsense.statics.program import NoPointError, Program
 from copsense.statics.tied_optimum import Lexicographic
 
@@ -241,6 +241,7 @@ def solve_constrained(
         limits: what to respect.
 
     Raises:
+        UnbalancedError: joints without a motor cannot be held at all.
         InfeasibleError: no wrench respects the limits; says which demand how much more.
         UndeterminedWrenchError: several wrenches are equally good, and no tie-break chooses.
         UnsolvedError: no solver found wrenches that meet the optimality conditions.
@@ -335,6 +336,7 @@ class _Problem:
 
     def solve(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Forces, multipliers of the base's balance and of the rows, slack."""
+        require_balance(self.stance, self.load)  # what no limit is to blame for
         tied = np.zeros(0, dtype=int)
         try:
             if self.tie is None:

@@ -13,13 +13,14 @@ from copsense.arrays import array_property, finite_array, owned
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UnbalancedError
 from copsense.load_problem import LoadProblem
-from copsense.robot import Robot
 from copsense.stance import Stance
 from copsense.statics.kkt import Kkt
 from copsense.statics.policy import BALANCE, WrenchPolicy, policy_forces, policy_name
 
 UNLOADED = 1e-9  # share of the weight under which a normal force counts as none
 PROJECT = "Project it: Z @ (Z.T @ v), Z = stance.admissible_motions."
+
+_FARTHEST = 100.0  # weights: what takes more force than that is held by nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -212,9 +213,7 @@ def _balanced(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The system's solution of a load, validated."""
     found = system.share(problem)
-    robot = system.stance.robot
-    if robot.unactuated_nv > robot.base_nv or system.stance.closures is not None:
-        _require_balance(robot, problem)
+    require_balance(system.stance, problem)
     if not problem.imbalance(found[0]) <= BALANCE * system.stance.robot.weight:
         raise InvalidInputError(
             f"criterion {criterion.name!r} cannot be solved to working accuracy at this stance: "
@@ -223,12 +222,23 @@ def _balanced(
     return found
 
 
-def _require_balance(robot: Robot, problem: LoadProblem) -> None:
-    """Reject a load that joints without a motor leave without an answer."""
-    forces = np.linalg.lstsq(problem.base_map, problem.base_wrench, rcond=1e-10)[0]
-    rest = np.concatenate(
-        [problem.base_wrench - problem.base_map @ forces, np.zeros(len(problem.torque_offset))]
-    )
+def require_balance(stance: Stance, problem: LoadProblem) -> None:
+    """Reject a load that joints without a motor leave without an answer, whatever shares it.
+
+    A direction that takes more than a hundred times the weight counts as held by nothing: so do
+    rods and contacts that hold a joint at the end of a lever of a micrometre.
+
+    Raises:
+        UnbalancedError: nothing can hold the robot; says which joints lack how much.
+    """
+    robot = stance.robot
+    if robot.unactuated_nv == robot.base_nv and stance.closures is None:
+        return
+    left, s, _ = np.linalg.svd(problem.base_map)
+    wanted = left.T @ problem.base_wrench
+    lost = np.ones(len(wanted), dtype=bool)
+    lost[: len(s)] = np.abs(wanted[: len(s)]) > _FARTHEST * robot.weight * s
+    rest = np.concatenate([left[:, lost] @ wanted[lost], np.zeros(len(problem.torque_offset))])
     missing = robot.from_drives(rest)
     if np.abs(missing).max() > BALANCE * robot.weight:
         largest = np.argsort(-np.abs(missing))[:6]

@@ -22,6 +22,7 @@ from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
 from copsense.statics.symmetric import SymmetricSystem
+from copsense.unheld import moved_joints
 
 if TYPE_CHECKING:
     from copsense.statics.equilibrium import StaticEquilibrium
@@ -108,9 +109,12 @@ class Kkt:
         if self.system.singular:
             left = np.abs(self.system.matrix @ dx - right).max(initial=0.0)
             if left > 1e-7 * max(1.0, np.abs(right).max(initial=0.0)):
+                loose = moved_joints(stance.robot, stance.unheld_motions)
                 raise UndeterminedWrenchError(
                     "the contacts lose rank at this very posture (a straight leg, say): the "
-                    "wrenches have no derivative here. Move the posture off the singularity."
+                    "wrenches have no derivative here. "
+                    + (f"No motor holds {', '.join(loose)}. " if loose else "")
+                    + "Move the posture off the singularity."
                 )
         df = dx[self.size :]
         if self.tie:

@@ -82,7 +82,7 @@ class Coordinates(ShortRepr):
 
 def solved_whole(stance: Stance) -> bool:
     """Whether loops, couplings or hanging joints tie base and limbs of a robot together."""
-    return stance.closures is not None or bool(stance.hanging)
+    return stance.closures is not None or bool(stance.hanging_motions.shape[1])
 
 
 def coordinate_names(stance: Stance) -> tuple[str, ...]:
