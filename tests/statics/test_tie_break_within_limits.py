@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 
 import copsense
 from copsense import Contact, Limits, TorqueTerm, minimum_torque, minimum_wrench
-from copsense.analysis.stance_analysis import _determined
+from copsense.analysis.asked import determined_criteria
 from copsense.criterion import Criterion
 from copsense.errors import (
     InfeasibleError,
@@ -205,6 +205,6 @@ def test_without_a_tie_break_it_says_so(corners):
 
 def test_an_analysis_within_limits_takes_the_tie_break_by_itself(corners):
     chosen = {"minimum-torque": minimum_torque()}
-    found, notes = _determined(corners, chosen, Limits(friction=0.4))
+    found, notes = determined_criteria(corners, chosen, Limits(friction=0.4))
     assert found["minimum-torque"] == TIED
     assert "of these the least wrench is shown" in notes[0]
