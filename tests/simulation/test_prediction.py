@@ -11,6 +11,7 @@ from copsense.controllers import Hold, PathReference, Ramp, Sine, lateral_refere
 from copsense.cop import center_of_pressure
 from copsense.limits import NO_LIMITS, Limits
 from copsense.scan import limit_travel
+from copsense.simulation import Scenario
 from copsense.simulation import prediction as module
 from copsense.simulation.prediction import predict, predict_lean
 from copsense.simulation.quasi_static import peak_acceleration, quasi_static
@@ -140,3 +141,45 @@ def test_a_list_of_configurations_is_predicted_by_its_cubics(icub):
     path = replace(bare, values=lateral.values - float(icub.com[1]), tangents=lateral.tangents)
     found = predict(PathReference(path, Ramp(0.05)), C2)
     assert found.excursion == pytest.approx(predict_lean(icub, C2, 0.05).excursion, abs=1e-7)
+
+
+def leaning(stance, y):
+    """The stance with its centre of mass to the left [m]."""
+    return copsense.posture.solve_posture(stance, com=(0.0, y, None)).stance
+
+
+def test_a_posture_that_a_criterion_cannot_hold_at_rest_is_said_with_a_way_out(icub):
+    stance = leaning(icub, 0.055)
+    found = copsense.cop_sensitivity(stance, C2)
+    outside = {
+        c.name: -c.sole.margin(p).distance for c, p in zip(stance.contacts, found.cop, strict=True)
+    }
+    (name,) = [name for name, distance in outside.items() if distance > 0]
+    note = predict(lateral_reference(stance, Hold()), C2).at_rest
+    said = f"the centre of pressure of {name} would lie {outside[name] * 1e3:.1f} mm outside"
+    assert note.startswith(
+        f"minimum-torque cannot hold this posture at rest without limits: {said}"
+    )
+    assert "Give limits (--limits cop-margin=0, limits=Limits()), within which it can." in note
+    assert copsense.balance(stance, C2, Scenario(0.003)).notes[-1] == note
+    assert predict(lateral_reference(stance, Hold()), C2, Limits()).at_rest == ""
+
+
+def test_another_criterion_is_proposed_where_it_holds_the_posture(icub):
+    # Left and right legs of which one costs nothing carry the load on the other's edge.
+    legs = {n: 1e-3 if n.startswith("l_") else 1.0 for n in icub.robot.torque_names}
+    lame = copsense.weighted_torque(legs).named("lame")
+    assert predict(lateral_reference(icub, Hold()), C2).at_rest == ""
+    note = predict(lateral_reference(icub, Hold()), lame).at_rest
+    assert note.endswith(", or another criterion: minimum-wrench holds it as it is.")
+
+
+def test_feet_that_slip_at_rest_and_postures_that_nothing_holds(icub):
+    reference = lateral_reference(leaning(icub, 0.02), Hold())
+    wrenches = copsense.solve_equilibrium(reference.path.stances[0], C2).wrenches
+    needed = np.hypot(*wrenches[:, :2].T) / wrenches[:, 2]
+    note = predict(reference, C2, friction=0.5 * float(needed.max())).at_rest
+    assert f"would need a friction of {needed.max():.2f}" in note
+    note = predict(lateral_reference(leaning(icub, 0.13), Hold()), C2).at_rest
+    assert note.startswith("This posture cannot be held at rest:")
+    assert note.endswith("Move the CoM over the feet.")

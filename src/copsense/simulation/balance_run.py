@@ -107,6 +107,8 @@ def balance(
         progress=progress,
         stop=stop,
     )
+    if prediction is not None and prediction.at_rest:
+        notes = (*notes, prediction.at_rest)
     recording = recording.with_notes((*notes, *closure_notes(stance), *hanging_notes(stance)))
     return recording if prediction is None else prediction.attach(recording)
 

@@ -23,6 +23,7 @@ from copsense.limits import Limits
 from copsense.margins import MarginTable, margin_table
 from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
+from copsense.simulation.at_rest import at_rest_note
 from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.quasi_static import QuasiStatic, quasi_static
 from copsense.simulation.recording import Recording
@@ -66,6 +67,7 @@ class StaticPrediction(ShortRepr):
         quasi_static: how far the motion is from one that is slow enough for statics.
         levers: at the start, what a sway does to each output of the statics.
         in_motion: the same with inertia, of a sine; None for another signal.
+        at_rest: what cannot be held at the start already, and the remedy; "" where all can.
     """
 
     values: Float[np.ndarray, " N"]
@@ -83,6 +85,7 @@ class StaticPrediction(ShortRepr):
     quasi_static: QuasiStatic
     levers: tuple[SwayLever, ...] = ()
     in_motion: TimedPrediction | None = None
+    at_rest: str = ""
 
     def __post_init__(self) -> None:
         """Own the arrays."""
@@ -257,6 +260,7 @@ def predict(
         quasi_static(start.stance, start.tangent, reference.signal),
         sway_levers(start.equilibrium, start.tangent),
         predict_in_motion(reference, criterion, limits),
+        at_rest_note(start.equilibrium, criterion, gaps.friction),
     )
 
 
@@ -313,6 +317,7 @@ class _Gaps:
     Attributes:
         contacts: name of the contact of each gap (r,).
         kinds: ``"cop"``, ``"normal force"`` or ``"friction"`` (r,).
+        friction: of the ground under each contact, by name.
         weight: of the robot [N].
     """
 
@@ -321,7 +326,7 @@ class _Gaps:
         self.table, self.weight = margin_table(stance, _GROUND), stance.robot.weight
         if not isinstance(friction, Mapping):
             friction = Scenario().friction_at_start(stance, friction)
-        self.friction = [friction[name] for name in stance.contact_names]
+        self.friction = {name: friction[name] for name in stance.contact_names}
         self.contacts = (*self.table.where, *stance.contact_names)
         self.kinds = (*self.table.kinds, *("friction" for _ in stance.contacts))
 
@@ -333,7 +338,7 @@ class _Gaps:
         wrenches = point.stance.unstack(point.forces)
         changes = point.stance.unstack(point.force_rates)
         gaps, rates = [], []
-        for mu, force, change in zip(self.friction, wrenches, changes, strict=True):
+        for mu, force, change in zip(self.friction.values(), wrenches, changes, strict=True):
             size = float(np.hypot(*force[:2]))
             # At rest in the plane a force begins to slip whichever way it goes.
             sideways = force[:2] @ change[:2] / size if size else float(np.hypot(*change[:2]))
