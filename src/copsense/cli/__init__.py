@@ -23,6 +23,7 @@ _COMMANDS = {
         ("robots", "robots", "List the robots known by name."),
         ("inspect", "inspect", "Inspect a robot: joints, motors, feet, and how it stands."),
         ("analyse", "analyse", "Analyse one posture: CoP, margin and sensitivity of each contact."),
+        ("explore", "explore", "Explore a robot in the browser."),
         ("sweep", "sweep", "Sweep the CoM or a joint and evaluate every posture."),
         ("plot", "plot", "Draw a sweep that `copsense sweep` wrote."),
         ("map", "map_command", "Map the sensitivity over a whole space of postures."),

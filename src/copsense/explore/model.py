@@ -298,6 +298,16 @@ class Model:
                 )
         return replace(view, binding=tuple(lines))
 
+    def values(self, view: View) -> dict[str, float]:
+        """Where a view's posture has each CoM and joint coordinate [m, rad]."""
+        robot = self.stance.robot
+        found = dict(zip(COM_COORDINATES, (float(c) for c in view.com), strict=True))
+        return {
+            name: found[name] if c.kind == "com" else robot.joint_position(view.q, name)
+            for name, c in self.coordinates.items()
+            if c.kind in ("com", "joint")
+        }
+
     def reach(self, state: State, name: str, stale: Stale = lambda: False) -> tuple[float, float]:
         """From where to where one coordinate of a state can go, the others as they are [m, rad].
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from copsense.explore.model import Model
+from copsense.explore.model import Model, Stage
 from copsense.explore.state import State
 from copsense.explore.view import View
 
@@ -37,6 +37,7 @@ class Worker:
         model: Model,
         publish: Publish,
         *,
+        stages: Sequence[tuple[float, Stage]] | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Lay it out; `start` starts the thread.
@@ -44,10 +45,12 @@ class Worker:
         Args:
             model: what answers.
             publish: called with every view, in the worker's thread.
+            stages: seconds of rest and what is then done; default the model's.
             clock: seconds, for the rest before a stage.
         """
         self.model, self._publish, self._clock = model, publish, clock
         self.view, self.error = None, ""
+        self._stages = tuple(model.stages if stages is None else stages)
         self._news = threading.Condition()
         self._latest: State | None = None
         self._asked = self._answered = 0
@@ -98,10 +101,9 @@ class Worker:
             self._show(self.model.view(state, number, self.view))
             self._answered, self._done = number, 0
             return 0.0
-        stages = self.model.stages
-        if self._done == len(stages) or self.view is None:
+        if self._done == len(self._stages) or self.view is None:
             return None
-        rest, stage = stages[self._done]
+        rest, stage = self._stages[self._done]
         wait = since + rest - self._clock()
         if wait > 0:
             return wait
@@ -127,7 +129,7 @@ class Worker:
                 wait = self.step()
             except Exception:  # a fault of ours must not end the window in silence
                 self.error = traceback.format_exc()
-                self._answered, self._done = self._asked, len(self.model.stages)
+                self._answered, self._done = self._asked, len(self._stages)
                 wait = None
             with self._news:
                 if wait != 0.0 and self._asked == self._answered and not self._stopping:

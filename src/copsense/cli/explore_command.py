@@ -1,0 +1,224 @@
+"""``copsense explore``: a robot in the browser."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from copsense.cli.criterion_options import criterion_options
+from copsense.cli.limit_options import read_limits
+from copsense.cli.printing import echo_json, echo_written
+from copsense.cli.stance_memory import remembered_stance
+from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.units import LENGTH, read_coordinates, read_positions
+from copsense.errors import InvalidInputError
+
+_NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
+    "--com-x": 1,
+    "--com-y": 1,
+    "--com-z": 1,
+    "--joint": 1,
+    "--at": 1,
+    "--criterion": 1,
+    "--characteristic-length": 1,
+    "--limits": 1,
+    "--save-stance": 1,
+    "--force-stance": 0,
+    "--export": 1,
+    "--force": 0,
+    "--port": 1,
+    "--host": 1,
+    "--no-browser": 0,
+    "--no-meshes": 0,
+    "--meshes": 0,
+    "--light": 0,
+    "--json": 0,
+}
+
+
+@click.command(
+    epilog="\b\nExamples:\n"
+    "  copsense explore icub\n"
+    "  copsense explore my.urdf --contact l_foot --contact r_foot --contact-at sole\n"
+    "  copsense explore talos --com-y 30mm --limits friction=0.5,torque=model\n"
+    "  copsense explore icub --com-y 30mm --export icub.html"
+)
+@stance_options
+@criterion_options
+@click.option("--com-x", type=LENGTH, metavar="LENGTH", help="World x of the CoM to begin with.")
+@click.option("--com-y", type=LENGTH, metavar="LENGTH", help="World y likewise.")
+@click.option("--com-z", type=LENGTH, metavar="LENGTH", help="World z likewise.")
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    metavar="JOINT=POSITION",
+    help="A joint likewise. Repeatable.",
+)
+@click.option(
+    "--at",
+    multiple=True,
+    metavar="COORDINATE=VALUE",
+    help="A coordinate likewise, the base held, as in copsense analyse. Repeatable.",
+)
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Where to listen; 0 for any free port."
+)
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="Address of this machine to listen at; another than the default lets others on the "
+    "network knock, who need the token of the address.",
+)
+@click.option("--no-browser", is_flag=True, help="Print the address alone; do not open it.")
+@click.option("--no-meshes", is_flag=True, help="Show the stick figure, not the robot's meshes.")
+@click.option("--light", is_flag=True, help="Draw less, for machines without a GPU.")
+@click.option(
+    "--export",
+    type=click.Path(),
+    help="Write the view as one self-contained page (.html), and do not listen. It shows the stick "
+    "figure; see --meshes.",
+)
+@click.option(
+    "--meshes",
+    is_flag=True,
+    help="Put the robot's meshes into the page of --export, with who made them: giving the page on "
+    "gives them on.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the page.")
+@click.option("--json", "as_json", is_flag=True, help="Print the address as JSON.")
+def explore(
+    robot: str | None,
+    criteria: tuple[str, ...],
+    characteristic_length: float,
+    limits: str | None,
+    com_x: float | None,
+    com_y: float | None,
+    com_z: float | None,
+    joints: tuple[str, ...],
+    at: tuple[str, ...],
+    port: int,
+    host: str,
+    no_browser: bool,
+    no_meshes: bool,
+    light: bool,
+    export: str | None,
+    meshes: bool,
+    force: bool,
+    as_json: bool,
+    **options: Any,
+) -> None:
+    """Show ROBOT in the browser, with sliders for its posture, criteria and limits.
+
+    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. What is shown has
+    the numbers of `copsense analyse`; "copy command" gives the line that prints them. Only this
+    machine can connect, and only by the whole address that is printed. Ctrl-C ends it. In Python:
+    copsense.explore.
+    """
+    from copsense.extras import require
+    from copsense.files import check_output
+
+    require("viser", "an explorer in the browser")
+    if export is not None:
+        check_output(export, suffixes=(".html",), overwrite=force)
+    elif meshes or force:
+        raise InvalidInputError("--meshes and --force are of the page that --export writes.")
+    from copsense.explore import Model, Setting, State
+
+    within = read_limits(limits)
+    stance = read_stance(robot, **options)
+    file = remembered_stance()
+    model = Model(
+        stance,
+        stance_words(sys.argv[1:]),
+        criteria=file.criteria or None if file else None,
+        limits=file.limits if file else None,
+    )
+    asked = {"com_x": com_x, "com_y": com_y, "com_z": com_z}
+    coordinates = {n: Setting(v, "m") for n, v in asked.items() if v is not None}
+    for name, value in read_positions(joints, stance.robot).items():
+        coordinates[name] = Setting(value, stance.robot.joint_unit(name))
+    held = read_coordinates(at, stance)
+    if held and coordinates:
+        raise InvalidInputError(
+            "--at says where the CoM and the joints are, and so do --com-x, --com-y, --com-z and "
+            "--joint. Give --at alone, or the others alone."
+        )
+    for name, value in held.items():
+        coordinates[name] = Setting(value, model.coordinates[name].unit)
+    state = State(
+        model.words,
+        coordinates,
+        bool(held),
+        criteria,
+        characteristic_length,
+        "own" if limits is None or within is None else within,
+        frozenset({"curve"}),
+    )
+    if export is not None:
+        from copsense.explore.export import export_page
+
+        export_page(model, state, Path(export), meshes=meshes, overwrite=force)
+        echo_written(export)
+        return
+    _serve(model, state, port, host, no_browser, not no_meshes, light, as_json)
+
+
+def _serve(
+    model: Any,
+    state: Any,
+    port: int,
+    host: str,
+    no_browser: bool,
+    meshes: bool,
+    light: bool,
+    as_json: bool,
+) -> None:
+    """Listen until Ctrl-C."""
+    import signal
+    import threading
+    import webbrowser
+
+    from copsense.explore.explorer import Explorer
+
+    # Background jobs of a shell ignore SIGINT; whoever sends one, or a SIGTERM, wants an end.
+    over = threading.Event()
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, lambda *_: over.set())
+    with Explorer(model, state, port=port, host=host, meshes=meshes, light=light) as explorer:
+        if as_json:
+            echo_json({"url": explorer.url, "seconds": explorer.seconds})
+        else:
+            click.echo(f"exploring {model.stance.robot.name} at {explorer.url}")
+            click.echo("Ctrl-C ends it.", err=True)
+        if host not in ("127.0.0.1", "localhost", "::1"):
+            click.echo(
+                f"note: {host} can be reached from the network; who knows the address can connect.",
+                err=True,
+            )
+        sys.stdout.flush()
+        if not no_browser:
+            webbrowser.open(explorer.url)
+        while not over.wait(0.5):
+            pass
+
+
+def stance_words(arguments: list[str]) -> list[str]:
+    """The words of a command line that say which stance is meant, without the command's name.
+
+    Args:
+        arguments: those of the command line, the command's name first.
+    """
+    words, rest = [], iter(arguments[1:])
+    for word in rest:
+        option, equals, _ = word.partition("=")
+        if option in _NOT_OF_THE_STANCE:
+            for _ in range(0 if equals else _NOT_OF_THE_STANCE[option]):
+                next(rest, None)
+        else:
+            words.append(word)
+    return words

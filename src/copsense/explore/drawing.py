@@ -1,0 +1,272 @@
+"""Drawing: a view as things in a scene. It only assigns; nothing is computed on the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from copsense.explore.shape import Shape
+from copsense.explore.view import CriterionView, View
+
+Colour = tuple[int, int, int]
+
+BONE: Colour = (150, 160, 172)
+INK: Colour = (29, 39, 51)
+GROUND: Colour = (205, 212, 219)
+SOLE: Colour = (70, 84, 99)
+COM: Colour = (29, 39, 51)
+# As in the figures: the paper's two criteria, then others in order.
+NAMED: Mapping[str, Colour] = {"minimum-wrench": (213, 94, 0), "minimum-torque": (0, 114, 178)}
+OTHERS: tuple[Colour, ...] = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
+SHADES = 24  # steps of the torque colours: else each tick sends every joint's
+_COLD, _MILD, _HOT = np.array([(196, 204, 212), (240, 200, 80), (200, 30, 30)], dtype=float)
+_LIFT = 0.002  # m: outlines over the ground, so that they do not flicker
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What of a view is drawn.
+
+    Attributes:
+        meshes: the robot's meshes, where it has some; if not, the stick figure.
+        forces: arrows of the contact forces.
+        torques: joints coloured by torque, of the criterion named; empty for none.
+        regions: outlines of the regions of the CoM.
+        axes: axes of the contact frames.
+        opacity: of the meshes.
+    """
+
+    meshes: bool = True
+    forces: bool = True
+    torques: str = ""
+    regions: bool = True
+    axes: bool = False
+    opacity: float = 1.0
+
+
+def criterion_colours(names: Sequence[str]) -> dict[str, Colour]:
+    """A colour for each criterion."""
+    rest = iter(OTHERS * (len(names) // len(OTHERS) + 1))
+    return {name: NAMED.get(name) or next(rest) for name in names}
+
+
+def effort_colour(share: float) -> Colour:
+    """Colour of a torque as a share of its limit, in steps; grey where there is none."""
+    if not np.isfinite(share):
+        return BONE
+    step = round(min(max(share, 0.0), 1.0) * (SHADES - 1)) / (SHADES - 1)
+    low, high, part = (_COLD, _MILD, 2 * step) if step < 0.5 else (_MILD, _HOT, 2 * step - 1)
+    r, g, b = (int(value) for value in np.round(low + part * (high - low)))
+    return r, g, b
+
+
+class Scene:
+    """The things that show a robot, and their places and colours by `show`."""
+
+    def __init__(self, server: Any, view: View, shape: Shape, *, light: bool = False) -> None:
+        """Put them there.
+
+        Args:
+            server: a viser server.
+            view: the first one; it says how many things of each kind there are.
+            shape: the robot's meshes.
+            light: leave out what slow machines cannot draw.
+        """
+        self._scene, self._shape = server.scene, shape
+        self.height = max(float(np.ptp(view.bones[..., 2])), 0.2)
+        self._unit = self.height / 100.0
+        self._light(light)
+        self._ground(view)
+        self._robot(view)
+        n, u = len(view.contacts), self._unit
+        self._soles = self._lines("/soles", 3.0, SOLE)
+        self._axes = [
+            self._scene.add_frame(f"/contacts/{k}", axes_length=8 * u, axes_radius=0.4 * u)
+            for k in range(n)
+        ]
+        self._com = self._ball("/com", 1.6 * u, COM)
+        self._plumb = self._lines("/plumb", 1.5, COM)
+        self._shadow = self._ball("/com on the ground", 0.9 * u, COM)
+        self._balls: dict[str, list[Any]] = {}
+        self._arrows: dict[str, Any] = {}
+        self._outlines: dict[str, Any] = {}
+        self._reference: Any = None
+
+    def show(self, view: View, shown: Shown) -> None:
+        """Draw a view; call it within ``server.atomic()``."""
+        self._show_robot(view, shown)
+        self._soles.points = _closed([np.asarray(sole) for sole in view.soles], _LIFT)
+        for handle, place in zip(self._axes, view.placements, strict=True):
+            handle.position, handle.wxyz = place[:3], place[3:]
+            handle.visible = shown.axes
+        ground = np.array([*view.com[:2], view.ground + _LIFT])
+        self._com.position, self._shadow.position = view.com, ground
+        self._plumb.points = np.array([[view.com, ground]])
+        colours = criterion_colours([each.name for each in view.criteria])
+        self._show_criteria(view, shown, colours)
+        self._show_regions(view, shown, colours)
+
+    def show_reference(self, points: np.ndarray | None) -> None:
+        """Where measured centres of pressure are, in the world; None for none."""
+        if self._reference is None and points is not None:
+            self._reference = self._scene.add_point_cloud(
+                "/measured", points, INK, point_size=2.2 * self._unit, point_shape="diamond"
+            )
+        if self._reference is not None:
+            self._reference.visible = points is not None
+            if points is not None:
+                self._reference.points = points.astype(np.float32)
+
+    def _light(self, light: bool) -> None:
+        self._scene.set_up_direction("+z")
+        if light:  # the first lit mesh costs a machine without a GPU half a minute otherwise
+            self._scene.configure_environment_map(None)
+        self._scene.configure_default_lights(True, cast_shadow=False)
+        if light:
+            self._scene.add_light_hemisphere("/sky", ground_color=(170, 170, 170), intensity=1.5)
+
+    def _ground(self, view: View) -> None:
+        step, reach = 0.1, max(8, round(1.2 * self.height / 0.1))
+        middle = np.round(view.placements[:, :2].mean(axis=0), 1)
+        ticks = step * np.arange(-reach, reach + 1)
+        ends = np.array([ticks[0], ticks[-1]])
+        across = [[[x, y, 0] for y in ends] for x in ticks]
+        along = [[[x, y, 0] for x in ends] for y in ticks]
+        handle = self._lines("/ground", 1.0, GROUND)
+        handle.points = np.array(across + along) + np.array([*middle, view.ground - _LIFT])
+
+    def _robot(self, view: View) -> None:
+        self._frames, self._meshes = {}, {}
+        for mesh in self._shape.meshes:
+            name = f"/robot/{mesh.joint}"
+            self._frames[mesh.joint] = self._scene.add_frame(name, show_axes=False)
+            self._meshes[mesh.joint] = self._scene.add_mesh_simple(
+                f"{name}/mesh",
+                np.asarray(mesh.vertices, np.float32),
+                np.asarray(mesh.faces, np.uint32),
+                color=BONE,
+                side="double",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        self._bones = self._scene.add_line_segments(
+            "/bones",
+            np.asarray(view.bones, np.float32),
+            BONE,
+            thickness=1.6 * self._unit,
+            thickness_units="world",
+        )
+        self._joints = self._scene.add_point_cloud(
+            "/joints",
+            np.asarray(view.poses[2:, :3], np.float32),
+            np.tile(np.array(BONE, np.uint8), (max(len(view.poses) - 2, 0), 1)),
+            point_size=2.4 * self._unit,
+            point_shape="circle",
+        )
+
+    def _show_robot(self, view: View, shown: Shown) -> None:
+        drawn = shown.meshes and bool(self._meshes)
+        efforts = _efforts(view, shown.torques)
+        colours = [effort_colour(efforts.get(name, np.nan)) for name in view.joints]
+        for joint, handle in self._frames.items():
+            handle.position, handle.wxyz = view.poses[joint, :3], view.poses[joint, 3:]
+            mesh = self._meshes[joint]
+            _assign(mesh, visible=drawn, color=colours[joint])
+            _assign(mesh, opacity=None if shown.opacity >= 1.0 else shown.opacity)
+        _assign(self._bones, visible=not drawn)
+        _assign(self._joints, visible=not drawn)
+        if not drawn:
+            self._bones.points = np.asarray(view.bones, np.float32)
+            self._joints.points = np.asarray(view.poses[2:, :3], np.float32)
+            self._joints.colors = np.array(colours[2:], np.uint8).reshape(-1, 3)
+
+    def _show_criteria(self, view: View, shown: Shown, colours: Mapping[str, Colour]) -> None:
+        weight = max(sum(float(each[2]) for each in _forces(view)), 1e-9)
+        for name, colour in colours.items():
+            if name not in self._balls:
+                self._balls[name] = [
+                    self._ball(f"/cop/{len(self._balls)}/{k}", 1.1 * self._unit, colour)
+                    for k in range(len(view.contacts))
+                ]
+                self._arrows[name] = self._scene.add_arrows(
+                    f"/force/{len(self._arrows)}",
+                    np.zeros((len(view.contacts), 2, 3), np.float32),
+                    colour,
+                    shaft_radius=0.5 * self._unit,
+                    head_radius=1.2 * self._unit,
+                    head_length=2.5 * self._unit,
+                )
+        for name, balls in self._balls.items():
+            there = name in colours
+            for ball in balls:
+                _assign(ball, visible=there)
+            _assign(self._arrows[name], visible=there and shown.forces)
+        for each in view.criteria:
+            for ball, cop in zip(self._balls[each.name], each.cop_world, strict=True):
+                ball.visible = bool(np.all(np.isfinite(cop)))
+                if ball.visible:
+                    ball.position = cop + np.array([0.0, 0.0, _LIFT])
+            if shown.forces:
+                tips = each.cop_world + each.forces * (0.6 * self.height / weight)
+                ends = np.stack([each.cop_world, tips], axis=1)
+                self._arrows[each.name].points = np.nan_to_num(ends).astype(np.float32)
+
+    def _show_regions(self, view: View, shown: Shown, colours: Mapping[str, Colour]) -> None:
+        found = {each.name: each.corners for each in view.regions or ()}
+        for name, corners in found.items():
+            if name not in self._outlines:
+                colour = colours.get(name, INK)
+                self._outlines[name] = self._lines(f"/region/{len(self._outlines)}", 2.5, colour)
+            flat = np.column_stack([corners, np.full(len(corners), view.ground)])
+            self._outlines[name].points = _closed([flat], _LIFT)
+        for name, handle in self._outlines.items():
+            _assign(handle, visible=shown.regions and name in found)
+
+    def _lines(self, name: str, width: float, colour: Colour) -> Any:
+        return self._scene.add_line_segments(
+            name, np.zeros((1, 2, 3), np.float32), colour, thickness=width, thickness_units="screen"
+        )
+
+    def _ball(self, name: str, radius: float, colour: Colour) -> Any:
+        return self._scene.add_icosphere(
+            name, radius, colour, subdivisions=2, cast_shadow=False, receive_shadow=False
+        )
+
+
+def _forces(view: View) -> np.ndarray:
+    first: CriterionView | None = next(iter(view.criteria), None)
+    return np.zeros((0, 3)) if first is None else np.asarray(first.forces)
+
+
+def _efforts(view: View, criterion: str) -> dict[str, float]:
+    """Share of its limit of each joint's torque, or of the largest torque where it has none."""
+    found = next((each for each in view.criteria if each.name == criterion), None)
+    if found is None:
+        return {}
+    largest = max(float(np.abs(found.torques).max(initial=0.0)), 1e-9)
+    shares = np.where(np.isfinite(found.effort), found.effort, np.abs(found.torques) / largest)
+    return dict(zip(view.torque_names, shares.tolist(), strict=True))
+
+
+def _closed(outlines: Sequence[np.ndarray], lift: float) -> np.ndarray:
+    """Outlines as segments, each back to where it began."""
+    parts = [
+        np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        for corners in outlines
+        if len(corners) > 1
+    ]
+    found = np.vstack(parts) if parts else np.zeros((1, 2, 3))
+    return np.asarray(found + np.array([0.0, 0.0, lift]), np.float32)
+
+
+def _assign(handle: Any, **values: Any) -> None:
+    """Assign what differs: each assignment is a message to every browser."""
+    for name, value in values.items():
+        old = getattr(handle, name)
+        if not (
+            old is value or (old is not None and value is not None and np.array_equal(old, value))
+        ):
+            setattr(handle, name, value)

@@ -1,0 +1,252 @@
+"""Explorer: a model, its panel and its scene in one window, and the thread that serves them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from copsense.errors import CopsenseError
+from copsense.explore.drawing import Scene
+from copsense.explore.model import Model, Stale
+from copsense.explore.panel import Panel
+from copsense.explore.server import LOOPBACK, GuardedServer
+from copsense.explore.shape import Shape, load_shape
+from copsense.explore.state import State
+from copsense.explore.view import View
+from copsense.explore.worker import Worker
+
+_FOLLOW, _ENDS = 0.3, 1.0  # s of rest before sliders follow the posture, and their ends the state
+
+
+class Explorer:
+    """A robot in the browser: open `url`, and `close` when done.
+
+    Also a context manager.
+
+    Attributes:
+        model: what answers.
+        server: the guarded server.
+        seconds: from the beginning to the first view drawn.
+    """
+
+    model: Model
+    server: GuardedServer
+    seconds: float
+
+    def __init__(
+        self,
+        model: Model,
+        state: State | None = None,
+        *,
+        port: int = 0,
+        host: str = LOOPBACK,
+        meshes: bool = True,
+        light: bool = False,
+    ) -> None:
+        """Draw the first view and begin to listen.
+
+        Args:
+            model: the stance to explore.
+            state: what is asked for to begin with; default the stance itself.
+            port: 0 for any that is free.
+            host: where to listen.
+            meshes: show the robot's meshes; if not, the stick figure.
+            light: leave out what machines without a GPU cannot draw.
+
+        Raises:
+            OutputError: nothing can listen there.
+            MissingExtraError: viser is not installed.
+        """
+        begun = time.monotonic()
+        self.model, self._status, self._saved = model, "", ""
+        self._lock = threading.Lock()
+        state = state or replace(model.start, overlays=frozenset({"curve"}))
+        self._shape, problem = _shape_of(model, meshes)
+        first = model.view(state)
+        self.server = GuardedServer(port, host)
+        try:
+            self._begin(state, first, problem, light)
+        except BaseException:
+            self.server.stop()
+            raise
+        self.seconds = time.monotonic() - begun
+
+    def _begin(self, state: State, first: View, problem: list[str], light: bool) -> None:
+        """Fill the window, and start the thread."""
+        viser, model = self.server.viser, self.model
+        viser.gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="large", dark_mode=False
+        )
+        viser.gui.set_panel_label(f"copsense explore: {model.stance.robot.name}")
+        self._worker = Worker(model, self._publish, stages=self._stages())
+        self._panel = Panel(
+            viser,
+            model,
+            state,
+            meshes=bool(self._shape.meshes),
+            changed=self._changed,
+            actions={
+                "reset": self._reset,
+                "above": self._from_above,
+                "front": self._from_front,
+                "save stance": self._save,
+            },
+        )
+        self._scene = Scene(viser, first, self._shape, light=light)
+        self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
+        self._compiling: threading.Thread | None = None
+        self._place_camera(first)
+        self._publish(first)
+        self._limited = threadpool_limits(1)  # small matrices: more threads only cost
+        self._worker.start()
+        self._worker.submit(state)
+
+    @property
+    def url(self) -> str:
+        """The address to open, with its token."""
+        return self.server.url
+
+    @property
+    def view(self) -> View | None:
+        """What is shown now."""
+        return self._worker.view
+
+    def close(self) -> None:
+        """Stop working, then listening."""
+        self._worker.stop()
+        self.server.stop()
+        self._limited.unregister()
+
+    def __enter__(self) -> Explorer:
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def _changed(self) -> None:
+        # Callbacks run in many threads: whoever reads last, reads the newest.
+        with self._lock:
+            state = self._panel.read()
+            if state.held and not self.model.compiled and self._compiling is None:
+                self._compiling = threading.Thread(target=self._compile, daemon=True)
+                self._compiling.start()
+            self._worker.submit(state)
+
+    def _publish(self, view: View) -> None:
+        viser = self.server.viser
+        status = "; ".join(
+            filter(None, (self._status, self._base_status, self._worker.error[-300:]))
+        )
+        with viser.atomic():
+            self._scene.show(view, self._panel.shown())
+            self._panel.write(view, status, self._saved)
+        viser.flush()
+
+    def _stages(self) -> tuple[tuple[float, Callable[[View, Stale], View]], ...]:
+        own = ((_FOLLOW, self._follow), (_ENDS, self._find_ends))
+        return tuple(sorted((*self.model.stages, *own), key=lambda stage: stage[0]))
+
+    def _follow(self, view: View, stale: Stale) -> View:
+        """Have the sliders that ask for nothing follow the posture."""
+        if not view.reason:
+            self._panel.follow(self.model.values(view))
+        return view
+
+    def _find_ends(self, view: View, stale: Stale) -> View:
+        """Let sliders end where the robot does."""
+        kinds = ("com", "trunk") if view.state.held else ("com",)
+        for name, coordinate in self.model.coordinates.items():
+            if coordinate.kind in kinds and not view.reason:
+                low, high = self.model.reach(view.state, name, stale)
+                if stale():
+                    return view
+                self._panel.set_ends(name, low, high)
+        return view
+
+    def _compile(self) -> None:
+        self._status = (
+            "charts are compiled, once on a machine (some 20 s); until then one posture at a time"
+        )
+        self._worker.again()
+        try:
+            self.model.use_compiled()
+            self._status = ""
+        except CopsenseError as error:
+            self._status = f"charts are not compiled: {error}"
+        self._worker.again()
+
+    def _reset(self) -> None:
+        self._saved = ""
+        self._panel.reset()
+
+    def _save(self) -> None:
+        from copsense.robots import save_stance
+
+        view = self.view
+        if view is None:
+            return
+        state = view.state
+        name = "".join(c if c.isalnum() or c in "-_" else "-" for c in self.model.stance.robot.name)
+        number, path = 1, Path(f"{name}-stance.toml")
+        while path.exists():
+            number += 1
+            path = Path(f"{name}-stance-{number}.toml")
+        words = self.model.words
+        try:
+            save_stance(
+                self.model.stance.at(view.q),
+                path,
+                robot=None if words[0].startswith("-") else words[0],
+                limits=self.model.limits_of(state),
+                criteria=tuple(self.model.criteria_of(state).values()),
+            )
+            self._saved = f"written: {path.absolute()}"
+        except CopsenseError as error:
+            self._saved = f"not written: {error}"
+        self._worker.again()
+
+    def _place_camera(self, view: View) -> None:
+        middle, size = _middle(view), self._scene.height
+        camera = self.server.viser.initial_camera
+        camera.look_at = middle
+        camera.position = middle + size * np.array([1.25, -0.85, 0.4])
+
+    def _from_above(self) -> None:
+        self._move_cameras(np.array([-1e-3, 0.0, 1.3]), at_ground=True)
+
+    def _from_front(self) -> None:
+        self._move_cameras(np.array([1.9, 0.0, 0.1]), at_ground=False)
+
+    def _move_cameras(self, way: np.ndarray, *, at_ground: bool) -> None:
+        view = self.view
+        if view is None:
+            return
+        middle = _middle(view)
+        if at_ground:
+            middle[2] = view.ground
+        for client in self.server.viser.get_clients().values():
+            with client.atomic():
+                client.camera.up_direction = (0.0, 0.0, 1.0)
+                client.camera.position = middle + self._scene.height * way
+                client.camera.look_at = middle
+
+
+def _middle(view: View) -> np.ndarray:
+    return np.array([*view.placements[:, :2].mean(axis=0), 0.55 * (view.ground + view.com[2])])
+
+
+def _shape_of(model: Model, meshes: bool) -> tuple[Shape, list[str]]:
+    if not meshes:
+        return Shape(), []
+    try:
+        return load_shape(model.stance.robot), []
+    except CopsenseError as error:
+        return Shape(), [f"stick figure: {error}"]

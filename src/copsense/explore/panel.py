@@ -1,0 +1,508 @@
+"""Panel: the controls beside the picture, what they ask for, and the words and numbers shown."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal
+
+import numpy as np
+
+from copsense.criterion import CRITERIA
+from copsense.errors import InvalidInputError
+from copsense.explore.drawing import Colour, Shown, criterion_colours, effort_colour
+from copsense.explore.model import Coordinate, Model
+from copsense.explore.state import Setting, State, weights_text
+from copsense.explore.view import View
+from copsense.limits import Limits
+
+NEAREST, HELD = "nearest posture", "base held"
+NONE, FILE = "none", "the stance file's"
+_WEIGHT_DECADES = 1.5
+_FRICTION = 0.5
+_KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": "Feet"}
+_CURVE_HEIGHT = 150  # pixels
+_OPACITY = 0.6  # of meshes at first: what counts is inside the feet
+_LEAST_SPAN = 0.1  # mm or deg, of a slider
+
+
+class Panel:
+    """The controls of an explorer.
+
+    Attributes:
+        touched: coordinates that are asked for, because their slider was moved.
+    """
+
+    touched: set[str]
+
+    def __init__(
+        self,
+        server: Any,
+        model: Model,
+        state: State,
+        *,
+        meshes: bool,
+        changed: Callable[[], object],
+        actions: Mapping[str, Callable[[], object]],
+    ) -> None:
+        """Lay out the controls.
+
+        Args:
+            server: a viser server.
+            model: what can be moved.
+            state: what is asked for to begin with.
+            meshes: whether there are any to show.
+            changed: called when anything was changed.
+            actions: label of a button -> what it does.
+        """
+        self._gui, self._model, self._changed = server.gui, model, changed
+        self._assigning = False
+        self._given = state
+        self.touched = set(state.coordinates)
+        gui = server.gui
+        self._status = gui.add_html("")
+        self._table = gui.add_html("")
+        self._curve: Any = None
+        self._curve_place = gui.add_folder(None)
+        self._copy = gui.add_html("")
+        buttons = gui.add_button_group("", tuple(actions))
+        buttons.on_click(lambda event: actions[event.target.value]())
+        self._coordinates(state)
+        self._judging(state)
+        self._showing(meshes)
+        self._more = gui.add_html("")
+
+    def _coordinates(self, state: State) -> None:
+        gui = self._gui
+        self._sliders: dict[str, Any] = {}
+        self._folders: dict[str, Any] = {}
+        with gui.add_folder("Posture"):
+            self._mode = gui.add_dropdown(
+                "what gives way",
+                (NEAREST, HELD),
+                initial_value=HELD if state.held else NEAREST,
+                hint="nearest posture: everything that is not asked for gives way; base held: what "
+                "is not asked for keeps the stance's value",
+            )
+            self._mode.on_update(self._mode_changed)
+            self._asked = gui.add_html("")
+        for kind, label in _KINDS.items():
+            own = [c for c in self._model.coordinates.values() if c.kind == kind]
+            if not own:
+                continue
+            self._folders[kind] = gui.add_folder(label, expand_by_default=kind == "com")
+            with self._folders[kind]:
+                for c in own:
+                    self._sliders[c.name] = self._slider(c, state)
+        self._show_kinds(state.held)
+
+    def _slider(self, c: Coordinate, state: State) -> Any:
+        setting = state.coordinates.get(c.name)
+        low, high = sorted((_shown(c, c.low), _shown(c, c.high)))
+        high = max(high, low + _LEAST_SPAN)
+        unit = "mm" if c.unit == "m" else "deg"
+        handle = self._gui.add_slider(
+            f"{c.name} [{unit}]",
+            min=round(low, 1),
+            max=round(high, 1),
+            step=0.1,
+            initial_value=round(_shown(c, c.home if setting is None else setting.value), 1),
+            hint="the joint's position" if c.kind == "joint" else "from where the stance has it",
+        )
+        handle.on_update(lambda event, name=c.name: self._moved(name))
+        return handle
+
+    def _judging(self, state: State) -> None:
+        gui, model = self._gui, self._model
+        names = [*CRITERIA]
+        if state.criteria == () and [c.name for c in model.criteria] != names[:2]:
+            names.insert(0, FILE)
+        first = FILE if FILE in names else "minimum-wrench"
+        second = NONE if FILE in names else "minimum-torque"
+        asked = [*state.criteria, NONE, NONE][:2] if state.criteria else [first, second]
+        with gui.add_folder("Criteria"):
+            self._criteria = []
+            for label, name in zip(("first", "second"), asked, strict=True):
+                options = [*dict.fromkeys([*names, name, NONE])]
+                handle = gui.add_dropdown(label, tuple(options), initial_value=name)
+                handle.on_update(self._any)
+                self._criteria.append(handle)
+            self._length = gui.add_slider(
+                "log10 of L [m]",
+                min=-2.0,
+                max=1.0,
+                step=0.01,
+                initial_value=round(math.log10(state.length), 2),
+                hint="length that makes moments comparable with forces in minimum-wrench",
+            )
+            self._length.on_update(self._any)
+            self._weights: dict[str, Any] = {}
+            for group in weight_groups(model):
+                slider = gui.add_slider(
+                    f"log10 of {group} weight",
+                    min=-_WEIGHT_DECADES,
+                    max=_WEIGHT_DECADES,
+                    step=0.01,
+                    initial_value=0.0,
+                    hint="of the squared torques in minimum-torque; 0 for the weight 1",
+                )
+                slider.on_update(self._any)
+                self._weights[group] = slider
+        with gui.add_folder("Limits", expand_by_default=False):
+            limits = model.limits_of(state)
+            self._limited = gui.add_checkbox(
+                "wrenches within limits",
+                limits is not None,
+                disabled=model.limits is not None,
+                hint="unilateral forces, friction and the soles' edges, as a QP",
+            )
+            given = limits.friction if limits is not None else _FRICTION
+            friction = given if isinstance(given, float) else _FRICTION
+            self._friction = gui.add_slider(
+                "friction", min=0.05, max=1.5, step=0.01, initial_value=friction
+            )
+            self._torque = gui.add_checkbox(
+                "torques of the model", limits is not None and limits.torque == "model"
+            )
+            for handle in (self._limited, self._friction, self._torque):
+                handle.on_update(self._limits_changed)
+        self._own_limits = state.limits
+
+    def _showing(self, meshes: bool) -> None:
+        gui = self._gui
+        with gui.add_folder("Show", expand_by_default=False):
+            self._opacity = gui.add_slider(
+                "robot", min=0.0, max=1.0, step=0.05, initial_value=_OPACITY, visible=meshes,
+                hint="opacity of the meshes; 0 for the stick figure",
+            )  # fmt: skip
+            self._forces = gui.add_checkbox("forces", True)
+            self._regions = gui.add_checkbox("regions of the CoM", False)
+            self._curve_on = gui.add_checkbox("margins along y", True)
+            self._axes = gui.add_checkbox("contact axes", False)
+            self._torques = gui.add_checkbox("torque colours", True)
+            shown = (self._opacity, self._forces, self._regions, self._curve_on, self._axes)
+            for handle in (*shown, self._torques):
+                handle.on_update(self._any)
+
+    def read(self) -> State:
+        """The state that the controls ask for."""
+        held = self._mode.value == HELD
+        coordinates = {}
+        for name in self._model.coordinates:
+            c = self._model.coordinates[name]
+            if name in self.touched and (held or c.kind in ("com", "joint")):
+                coordinates[name] = Setting(_meant(c, self._sliders[name].value), c.unit)
+        overlays = {"curve": self._curve_on.value, "regions": self._regions.value}
+        return State(
+            self._model.words,
+            coordinates,
+            held,
+            self._read_criteria(),
+            _power(self._length.value),
+            self._read_limits(),
+            frozenset(name for name, on in overlays.items() if on),
+        )
+
+    def _read_criteria(self) -> tuple[str, ...]:
+        weights = {group: _power(slider.value) for group, slider in self._weights.items()}
+        weighted = weights_text(weights)
+        named = [handle.value for handle in self._criteria]
+        if named == [FILE, NONE] or (
+            named == ["minimum-wrench", "minimum-torque"]
+            and weighted == "minimum-torque"
+            and self._length.value == 0.0
+            and [c.name for c in self._model.criteria] == named
+        ):
+            return ()
+        found = []
+        for name in named:
+            if name == FILE:
+                found += [c.name for c in self._model.criteria if c.name in CRITERIA]
+            elif name != NONE:
+                found.append(weighted if name == "minimum-torque" else name)
+        return tuple(dict.fromkeys(found)) or ("minimum-torque",)
+
+    def _read_limits(self) -> Limits | Literal["own"] | None:
+        if isinstance(self._own_limits, str):
+            return self._own_limits
+        if not self._limited.value:
+            return None
+        torque: Literal["model"] | None = "model" if self._torque.value else None
+        return Limits(friction=round(self._friction.value, 2), torque=torque)
+
+    def shown(self) -> Shown:
+        """What is to be drawn."""
+        opacity = float(self._opacity.value)
+        chosen = [h.value for h in self._criteria if h.value != NONE]
+        return Shown(
+            meshes=opacity > 0.0,
+            forces=self._forces.value,
+            torques=chosen[-1] if chosen and self._torques.value else "",
+            regions=self._regions.value,
+            axes=self._axes.value,
+            opacity=opacity,
+        )
+
+    def reset(self) -> None:
+        """Ask for nothing: every control back to where it was at first."""
+        with self._silently():
+            self.touched.clear()
+            self._mode.value = NEAREST
+            self._show_kinds(False)
+            for name, slider in self._sliders.items():
+                slider.value = round(_shown(self._model.coordinates[name], self._home(name)), 1)
+            self._length.value = 0.0
+            for slider in self._weights.values():
+                slider.value = 0.0
+        self._changed()
+
+    def follow(self, values: Mapping[str, float]) -> None:
+        """Have the sliders that ask for nothing show where the posture has them [m, rad]."""
+        with self._silently():
+            for name, value in values.items():
+                slider = self._sliders[name]
+                at = round(_shown(self._model.coordinates[name], value), 1)
+                if name not in self.touched and abs(at - slider.value) > 0.05:
+                    _widen(slider, at)
+                    slider.value = at
+
+    def set_ends(self, name: str, low: float, high: float) -> None:
+        """Say from where to where a coordinate can go [m, rad]."""
+        c, slider = self._model.coordinates[name], self._sliders[name]
+        ends = sorted((_shown(c, low), _shown(c, high)))
+        low, high = math.floor(ends[0] * 10) / 10, math.ceil(ends[1] * 10) / 10
+        with self._silently():
+            slider.min = min(low, slider.value)
+            slider.max = max(high, slider.value, slider.min + _LEAST_SPAN)
+
+    def write(self, view: View, status: str, save: str = "") -> None:
+        """Show a view's words and numbers."""
+        colours = criterion_colours([each.name for each in view.criteria])
+        self._status.content = _status_html(view, status)
+        self._table.content = _table_html(view, colours)
+        self._asked.content = _asked_html(view.state, self._model)
+        self._copy.content = _copy_html(view.state, save)
+        self._more.content = _notes_html(view)
+        self._plot(view, colours)
+
+    def _plot(self, view: View, colours: Mapping[str, Colour]) -> None:
+        if not len(view.curve_y):
+            if self._curve is not None:
+                self._curve.visible = False
+            return
+        y = view.curve_y * 1e3
+        now = float(view.com[1]) * 1e3
+        rows = [row * 1e3 for row in view.curve_margin]
+        low, high = _span(rows)
+        room = 0.05 * (high - low) + 1.0
+        scales = {
+            "x": {"time": False},
+            "y": {"auto": False, "range": (low - room, high + room)},
+        }
+        # The cursor: an upright line at the CoM's y, two points of a series of its own.
+        at = np.sort(np.append(y, [now - 1e-3, now + 1e-3]))
+        margins = [np.interp(at, y, row, left=np.nan, right=np.nan) for row in rows]
+        cursor = np.full(len(at), np.nan)
+        first = int(np.searchsorted(at, now - 2e-3))
+        cursor[first : first + 2] = low - room, high + room
+        data = (at, *margins, cursor)
+        if self._curve is not None and len(self._curve.data) == len(data):
+            if self._curve.scales != scales:
+                self._curve.scales = scales
+            self._curve.data = data
+            self._curve.visible = True
+            return
+        if self._curve is not None:
+            self._curve.remove()
+        series: tuple[Any, ...] = (
+            {"label": "CoM y [mm]"},
+            *(
+                {"label": name, "stroke": _css(colour), "width": 2}
+                for name, colour in list(colours.items())[: len(rows)]
+            ),
+            {"label": "now", "stroke": "#555", "width": 1.5},
+        )
+        with self._curve_place:
+            self._curve = self._gui.add_uplot(
+                data,
+                series,
+                title="least margin [mm] over CoM y [mm]",
+                scales=scales,
+                height=_CURVE_HEIGHT,
+                legend={"show": False},
+            )
+
+    def _home(self, name: str) -> float:
+        return self._model.coordinates[name].home
+
+    def _moved(self, name: str) -> None:
+        if not self._assigning:
+            self.touched.add(name)
+            self._changed()
+
+    def _any(self, event: object) -> None:
+        if not self._assigning:
+            self._changed()
+
+    def _limits_changed(self, event: object) -> None:
+        if not self._assigning:
+            self._own_limits = None  # from now on those of the controls
+            self._changed()
+
+    def _mode_changed(self, event: object) -> None:
+        if not self._assigning:
+            self._show_kinds(self._mode.value == HELD)
+            self._changed()
+
+    def _show_kinds(self, held: bool) -> None:
+        for kind in ("trunk", "foot"):
+            if kind in self._folders:
+                self._folders[kind].visible = held
+
+    @contextmanager
+    def _silently(self) -> Iterator[None]:
+        """Assign without asking for a new state: assigning calls what updates call."""
+        before, self._assigning = self._assigning, True
+        try:
+            yield
+        finally:
+            self._assigning = before
+
+
+def weight_groups(model: Model) -> list[str]:
+    """Parts of the joints' names that have a weight of their own, where ``--criterion`` can say it.
+
+    A group is named by a part that every joint of it has in its name, and no other.
+    """
+    names = model.stance.robot.torque_names
+    return [
+        group
+        for group, joints in model.groups.items()
+        if {n for n in names if group in n} == set(joints)
+    ]
+
+
+def _shown(c: Coordinate, value: float) -> float:
+    """A coordinate as its slider shows it [mm, deg]."""
+    scale = 1e3 if c.unit == "m" else math.degrees(1.0)
+    return scale * (value if c.kind == "joint" else c.sign * (value - c.home))
+
+
+def _meant(c: Coordinate, shown: float) -> float:
+    """What a slider's number means [m, rad]."""
+    value = shown / 1e3 if c.unit == "m" else math.radians(shown)
+    return value if c.kind == "joint" else c.home + c.sign * value
+
+
+def _power(logarithm: float) -> float:
+    """Ten to a slider's value, in four digits, so that commands stay short."""
+    return float(f"{10.0**logarithm:.4g}")
+
+
+def _widen(slider: Any, value: float) -> None:
+    if value < slider.min:
+        slider.min = value
+    if value > slider.max:
+        slider.max = value
+
+
+def _span(rows: Sequence[np.ndarray]) -> tuple[float, float]:
+    found = np.concatenate([row[np.isfinite(row)] for row in rows] or [np.zeros(1)])
+    return (float(found.min()), float(found.max())) if len(found) else (0.0, 1.0)
+
+
+def _css(colour: Colour) -> str:
+    return f"rgb({colour[0]},{colour[1]},{colour[2]})"
+
+
+def _text(value: object) -> str:
+    return html.escape(str(value), quote=True)
+
+
+def _status_html(view: View, status: str) -> str:
+    revision = f'<span id="copsense-revision" hidden>{view.revision}</span>'
+    said = f'<div style="opacity:.7">{_text(status)}</div>' if status else ""
+    if view.reason:
+        said += (
+            '<div style="background:#b3261e;color:white;padding:.4em .6em;border-radius:.3em">'
+            f"{_text(view.reason)} The last posture is shown.</div>"
+        )
+    else:
+        said += f'<div style="font-weight:600">{_text(view.verdict)}.</div>'
+    return f'<div style="padding:0 .8em;font-size:.85em;line-height:1.35">{revision}{said}</div>'
+
+
+def _table_html(view: View, colours: Mapping[str, Colour]) -> str:
+    parts, last = [], ""
+    for criterion, contact, load, cop, margin, travel in view.rows:
+        if criterion != last:
+            dot = _css(colours[criterion])
+            parts.append(
+                f'<tr><th colspan="5" style="text-align:left;padding-top:.5em">'
+                f'<span style="color:{dot}">&#9679;</span> {_text(criterion)}</th></tr>'
+            )
+            last = criterion
+        cells = "".join(
+            f'<td style="padding:0 .4em .1em 0">{_text(word)}</td>'
+            for word in (contact, load, cop, margin, travel)
+        )
+        parts.append(f"<tr>{cells}</tr>")
+    head = "".join(
+        f'<td style="opacity:.6;padding:0 .3em 0 0">{word}</td>'
+        for word in ("contact", "load", "CoP x, y", "margin", "CoM travel")
+    )
+    shades = ",".join(_css(effort_colour(share)) for share in (0.0, 0.5, 1.0))
+    return (
+        '<div style="padding:0 .8em;overflow-x:auto"><table style="font-size:.72em;'
+        f'border-spacing:0;width:100%"><tr>{head}</tr>{"".join(parts)}</table>'
+        '<div style="font-size:.68em;opacity:.7">lengths in mm; joints by torque, from none to its '
+        'limit (the largest, where the model has no limits): <span style="display:inline-block;'
+        f'width:5em;height:.7em;background:linear-gradient(90deg,{shades})"></span></div></div>'
+    )
+
+
+def _asked_html(state: State, model: Model) -> str:
+    def said(name: str, setting: Setting) -> str:
+        scaled = setting.value * 1e3 if setting.unit == "m" else math.degrees(setting.value)
+        return f"{name} = {round(scaled, 1) + 0.0:g} {'mm' if setting.unit == 'm' else 'deg'}"
+
+    asked = ", ".join(said(n, s) for n, s in state.coordinates.items())
+    return (
+        '<div style="padding:0 .8em;font-size:.75em;opacity:.8">'
+        f"asked for, in world axes: {_text(asked or 'nothing, the stance itself')}</div>"
+    )
+
+
+def _copy_html(state: State, save: str) -> str:
+    try:
+        command = state.to_command()
+    except InvalidInputError as error:
+        return f'<div style="padding:0 .8em;font-size:.75em">no command: {_text(error)}</div>'
+    buttons = "".join(
+        '<button style="margin:0 .5em .3em 0;padding:.25em .7em;border-radius:.3em;border:1px solid'
+        ' #8888;cursor:pointer;font-size:.8em" data-text="'
+        f'{_text(text)}" onclick="navigator.clipboard.writeText(this.dataset.text)'
+        ".then(() => {const was = this.innerText; this.innerText = 'copied';"
+        f'setTimeout(() => this.innerText = was, 900)}})">{label}</button>'
+        for label, text in (("copy command", command), ("copy Python", state.to_python()))
+    )
+    saved = f'<div style="font-size:.75em">{_text(save)}</div>' if save else ""
+    return (
+        f'<div style="padding:0 .8em">{buttons}{saved}<code id="copsense-command" style="display:'
+        f'block;font-size:.68em;overflow-wrap:anywhere;opacity:.8">{_text(command)}</code></div>'
+    )
+
+
+def _notes_html(view: View) -> str:
+    lines = [*(view.binding or ()), *view.notes]
+    for each in view.criteria:
+        lines += [f"{each.name}, active: {'; '.join(each.active[:6])}"] * bool(each.active)
+        lines += [f"{each.name}, nearest: {'; '.join(each.nearest)}"] * bool(each.nearest)
+    items = "".join(f"<li>{_text(line)}</li>" for line in lines)
+    return (
+        f'<ul style="padding:0 .8em 0 2em;font-size:.75em;line-height:1.35">{items}</ul>'
+        if items
+        else ""
+    )
