@@ -25,6 +25,7 @@ _FRICTION = 0.5
 _KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": "Feet"}
 _CURVE_HEIGHT = 150  # pixels
 _OPACITY = 0.6  # of meshes at first: what counts is inside the feet
+_DEEPEST = 40.0  # mm outside the soles that the curve shows
 _LEAST_SPAN = 0.1  # mm or deg, of a slider
 
 
@@ -296,6 +297,7 @@ class Panel:
         now = float(view.com[1]) * 1e3
         rows = [row * 1e3 for row in view.curve_margin]
         low, high = _span(rows)
+        low = max(low, -_DEEPEST)  # far outside nobody compares
         room = 0.05 * (high - low) + 1.0
         scales = {
             "x": {"time": False},
@@ -393,7 +395,8 @@ def _shown(c: Coordinate, value: float) -> float:
 def _meant(c: Coordinate, shown: float) -> float:
     """What a slider's number means [m, rad]."""
     value = shown / 1e3 if c.unit == "m" else math.radians(shown)
-    return value if c.kind == "joint" else c.home + c.sign * value
+    # To a nanometre: homes that miss zero by rounding would make commands long.
+    return round(value if c.kind == "joint" else c.home + c.sign * value, 9)
 
 
 def _power(logarithm: float) -> float:
