@@ -43,6 +43,7 @@ def test_example_runs_and_its_numbers_hold(example):
         "README.md",
         "docs/adding.md",
         "docs/balancing.md",
+        "docs/explore.md",
         "docs/logs.md",
         "docs/maps.md",
         "docs/postures.md",

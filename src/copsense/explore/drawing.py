@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ NAMED: Mapping[str, Colour] = {"minimum-wrench": (213, 94, 0), "minimum-torque":
 OTHERS: tuple[Colour, ...] = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 SHADES = 24  # steps of the torque colours: else each tick sends every joint's
 _COLD, _MILD, _HOT = np.array([(196, 204, 212), (240, 200, 80), (200, 30, 30)], dtype=float)
+OPACITY = 0.6  # of meshes at first: what counts is inside the feet
 _LIFT = 0.002  # m: outlines over the ground, so that they do not flicker
 
 
@@ -31,7 +32,7 @@ class Shown:
     """What of a view is drawn.
 
     Attributes:
-        meshes: the robot's meshes, where it has some; if not, the stick figure.
+        robot: its meshes where it has some, the stick figure, or neither.
         forces: arrows of the contact forces.
         torques: joints coloured by torque, of the criterion named; empty for none.
         regions: outlines of the regions of the CoM.
@@ -39,7 +40,7 @@ class Shown:
         opacity: of the meshes.
     """
 
-    meshes: bool = True
+    robot: Literal["meshes", "stick figure", "hidden"] = "meshes"
     forces: bool = True
     torques: str = ""
     regions: bool = True
@@ -51,6 +52,20 @@ def criterion_colours(names: Sequence[str]) -> dict[str, Colour]:
     """A colour for each criterion."""
     rest = iter(OTHERS * (len(names) // len(OTHERS) + 1))
     return {name: NAMED.get(name) or next(rest) for name in names}
+
+
+def look_at(view: View) -> tuple[np.ndarray, float]:
+    """The middle of a robot, and how large it is [m]."""
+    points = np.vstack([view.bones.reshape(-1, 3), view.placements[:, :3]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.2)
+
+
+def place_camera(server: Any, view: View) -> None:
+    """Have the robot in the picture when a browser connects."""
+    middle, size = look_at(view)
+    server.initial_camera.look_at = middle
+    server.initial_camera.position = middle + size * np.array([1.05, -0.7, 0.3])
 
 
 def effort_colour(share: float) -> Colour:
@@ -168,7 +183,8 @@ class Scene:
         )
 
     def _show_robot(self, view: View, shown: Shown) -> None:
-        drawn = shown.meshes and bool(self._meshes)
+        drawn = shown.robot == "meshes" and bool(self._meshes)
+        sticks = not drawn and shown.robot != "hidden"
         efforts = _efforts(view, shown.torques)
         colours = [effort_colour(efforts.get(name, np.nan)) for name in view.joints]
         for joint, handle in self._frames.items():
@@ -176,9 +192,9 @@ class Scene:
             mesh = self._meshes[joint]
             _assign(mesh, visible=drawn, color=colours[joint])
             _assign(mesh, opacity=None if shown.opacity >= 1.0 else shown.opacity)
-        _assign(self._bones, visible=not drawn)
-        _assign(self._joints, visible=not drawn)
-        if not drawn:
+        _assign(self._bones, visible=sticks)
+        _assign(self._joints, visible=sticks)
+        if sticks:
             self._bones.points = np.asarray(view.bones, np.float32)
             self._joints.points = np.asarray(view.poses[2:, :3], np.float32)
             self._joints.colors = np.array(colours[2:], np.uint8).reshape(-1, 3)

@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from copsense.errors import CopsenseError
-from copsense.explore.drawing import Scene
+from copsense.explore.drawing import Scene, look_at, place_camera
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
 from copsense.explore.server import LOOPBACK, GuardedServer
@@ -101,7 +101,7 @@ class Explorer:
         self._scene = Scene(viser, first, self._shape, light=light)
         self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
         self._compiling: threading.Thread | None = None
-        self._place_camera(first)
+        place_camera(viser, first)
         self._publish(first)
         self._limited = threadpool_limits(1)  # small matrices: more threads only cost
         self._worker.start()
@@ -185,6 +185,7 @@ class Explorer:
 
     def _reset(self) -> None:
         self._saved = ""
+        self._panel.hide_robot(False)
         self._panel.reset()
 
     def _save(self) -> None:
@@ -213,34 +214,26 @@ class Explorer:
             self._saved = f"not written: {error}"
         self._worker.again()
 
-    def _place_camera(self, view: View) -> None:
-        middle, size = _middle(view), self._scene.height
-        camera = self.server.viser.initial_camera
-        camera.look_at = middle
-        camera.position = middle + size * np.array([1.25, -0.85, 0.4])
-
     def _from_above(self) -> None:
-        self._move_cameras(np.array([-1e-3, 0.0, 1.3]), at_ground=True)
+        self._panel.hide_robot(True)  # what counts is under it
+        self._move_cameras(np.array([-1e-3, 0.0, 0.6]), at_ground=True)
 
     def _from_front(self) -> None:
-        self._move_cameras(np.array([1.9, 0.0, 0.1]), at_ground=False)
+        self._panel.hide_robot(False)
+        self._move_cameras(np.array([1.25, 0.0, 0.1]), at_ground=False)
 
     def _move_cameras(self, way: np.ndarray, *, at_ground: bool) -> None:
         view = self.view
         if view is None:
             return
-        middle = _middle(view)
+        middle, size = look_at(view)
         if at_ground:
             middle[2] = view.ground
         for client in self.server.viser.get_clients().values():
             with client.atomic():
                 client.camera.up_direction = (0.0, 0.0, 1.0)
-                client.camera.position = middle + self._scene.height * way
+                client.camera.position = middle + size * way
                 client.camera.look_at = middle
-
-
-def _middle(view: View) -> np.ndarray:
-    return np.array([*view.placements[:, :2].mean(axis=0), 0.55 * (view.ground + view.com[2])])
 
 
 def _shape_of(model: Model, meshes: bool) -> tuple[Shape, list[str]]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from copsense._version import __version__
 from copsense.errors import InvalidInputError
-from copsense.explore.drawing import Scene, Shown, criterion_colours
+from copsense.explore.drawing import OPACITY, Scene, Shown, criterion_colours, place_camera
 from copsense.explore.model import Model
 from copsense.explore.server import GuardedServer
 from copsense.explore.shape import Shape, load_shape
@@ -20,7 +20,8 @@ _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 0 auto; max-width: 70rem; padding: 1rem; }
 h1 { font-size: 1.3rem; margin: 0 0 .3rem; }
 iframe { width: 100%; height: min(70vh, 42rem); border: 1px solid #8886; border-radius: .4rem; }
-table { border-spacing: 0; } td, th { padding: .1rem .9rem .1rem 0; text-align: left; }
+table { border-spacing: 0; }
+td, th { padding: .1rem .9rem .1rem 0; text-align: left; white-space: nowrap; }
 .wide { overflow-x: auto; }
 code { overflow-wrap: anywhere; font-size: .85em; }
 footer { opacity: .75; font-size: .85em; margin-top: 1rem; }
@@ -70,16 +71,8 @@ def _scene_html(view: View, shape: Shape) -> str:
     try:
         scene = Scene(server.viser, view, shape, light=True)
         names = [each.name for each in view.criteria]
-        scene.show(view, Shown(torques=names[-1] if names else ""))
-        camera = server.viser.initial_camera
-        middle = (*view.placements[:, :2].mean(axis=0), 0.55 * (view.ground + float(view.com[2])))
-        camera.look_at = middle
-        size = scene.height
-        camera.position = (
-            middle[0] + 1.7 * size,
-            middle[1] - 1.2 * size,
-            middle[2] + 0.55 * size,
-        )
+        scene.show(view, Shown(torques=names[-1] if names else "", opacity=OPACITY))
+        place_camera(server.viser, view)
         return str(server.viser.get_scene_serializer().as_html())
     finally:
         server.stop()

@@ -12,19 +12,19 @@ import numpy as np
 
 from copsense.criterion import CRITERIA
 from copsense.errors import InvalidInputError
-from copsense.explore.drawing import Colour, Shown, criterion_colours, effort_colour
+from copsense.explore.drawing import OPACITY, Colour, Shown, criterion_colours, effort_colour
 from copsense.explore.model import Coordinate, Model
 from copsense.explore.state import Setting, State, weights_text
 from copsense.explore.view import View
 from copsense.limits import Limits
 
 NEAREST, HELD = "nearest posture", "base held"
+MESHES, STICKS, HIDDEN = "meshes", "stick figure", "hidden"
 NONE, FILE = "none", "the stance file's"
 _WEIGHT_DECADES = 1.5
 _FRICTION = 0.5
 _KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": "Feet"}
 _CURVE_HEIGHT = 150  # pixels
-_OPACITY = 0.6  # of meshes at first: what counts is inside the feet
 _DEEPEST = 40.0  # mm outside the soles that the curve shows
 _LEAST_SPAN = 0.1  # mm or deg, of a slider
 
@@ -174,16 +174,24 @@ class Panel:
     def _showing(self, meshes: bool) -> None:
         gui = self._gui
         with gui.add_folder("Show", expand_by_default=False):
+            looks = (MESHES, STICKS, HIDDEN) if meshes else (STICKS, HIDDEN)
+            self._robot = gui.add_dropdown("robot", looks, initial_value=looks[0])
             self._opacity = gui.add_slider(
-                "robot", min=0.0, max=1.0, step=0.05, initial_value=_OPACITY, visible=meshes,
-                hint="opacity of the meshes; 0 for the stick figure",
-            )  # fmt: skip
+                "opacity", min=0.1, max=1.0, step=0.05, initial_value=OPACITY, visible=meshes
+            )
             self._forces = gui.add_checkbox("forces", True)
             self._regions = gui.add_checkbox("regions of the CoM", False)
             self._curve_on = gui.add_checkbox("margins along y", True)
             self._axes = gui.add_checkbox("contact axes", False)
             self._torques = gui.add_checkbox("torque colours", True)
-            shown = (self._opacity, self._forces, self._regions, self._curve_on, self._axes)
+            shown = (
+                self._robot,
+                self._opacity,
+                self._forces,
+                self._regions,
+                self._curve_on,
+                self._axes,
+            )
             for handle in (*shown, self._torques):
                 handle.on_update(self._any)
 
@@ -235,15 +243,14 @@ class Panel:
 
     def shown(self) -> Shown:
         """What is to be drawn."""
-        opacity = float(self._opacity.value)
         chosen = [h.value for h in self._criteria if h.value != NONE]
         return Shown(
-            meshes=opacity > 0.0,
+            robot=self._robot.value,
             forces=self._forces.value,
             torques=chosen[-1] if chosen and self._torques.value else "",
             regions=self._regions.value,
             axes=self._axes.value,
-            opacity=opacity,
+            opacity=float(self._opacity.value),
         )
 
     def reset(self) -> None:
@@ -258,6 +265,12 @@ class Panel:
             for slider in self._weights.values():
                 slider.value = 0.0
         self._changed()
+
+    def hide_robot(self, hidden: bool) -> None:
+        """Hide the robot, as for a view from above, or show it again."""
+        looks = self._robot.options
+        if hidden != (self._robot.value == HIDDEN):
+            self._robot.value = HIDDEN if hidden else looks[0]
 
     def follow(self, values: Mapping[str, float]) -> None:
         """Have the sliders that ask for nothing show where the posture has them [m, rad]."""
@@ -289,7 +302,7 @@ class Panel:
         self._plot(view, colours)
 
     def _plot(self, view: View, colours: Mapping[str, Colour]) -> None:
-        if not len(view.curve_y):
+        if not np.isfinite(view.curve_margin).any():  # none yet, or feet without soles
             if self._curve is not None:
                 self._curve.visible = False
             return

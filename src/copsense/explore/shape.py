@@ -195,7 +195,8 @@ def _read_other(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
     try:
         mesh: Any = trimesh.load(str(path), force="mesh")
-        return np.array(mesh.vertices, float), np.array(mesh.faces, np.int64)
+        # Corners that several triangles share, once: thinning out would tear them apart.
+        return _joined(np.array(mesh.vertices, float)[np.array(mesh.faces)].reshape(-1, 3))
     except Exception as error:  # readers of many formats raise anything
         raise ModelLoadError(
             f"mesh {path} cannot be read: {type(error).__name__}: {error}. Leave meshes out with "
