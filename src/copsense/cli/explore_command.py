@@ -11,9 +11,9 @@ import click
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import echo_json, echo_written
-from copsense.cli.stance_memory import remembered_stance
+from copsense.cli.stance_memory import remembered_stance, written
 from copsense.cli.stance_options import read_stance, stance_options
-from copsense.cli.units import LENGTH, read_coordinates, read_positions
+from copsense.cli.units import read_coordinates, read_positions
 from copsense.errors import InvalidInputError
 
 _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
@@ -48,22 +48,6 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
 )
 @stance_options
 @criterion_options
-@click.option("--com-x", type=LENGTH, metavar="LENGTH", help="World x of the CoM to begin with.")
-@click.option("--com-y", type=LENGTH, metavar="LENGTH", help="World y likewise.")
-@click.option("--com-z", type=LENGTH, metavar="LENGTH", help="World z likewise.")
-@click.option(
-    "--joint",
-    "joints",
-    multiple=True,
-    metavar="JOINT=POSITION",
-    help="A joint likewise. Repeatable.",
-)
-@click.option(
-    "--at",
-    multiple=True,
-    metavar="COORDINATE=VALUE",
-    help="A coordinate likewise, the base held, as in copsense analyse. Repeatable.",
-)
 @click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Where to listen; 0 for any free port."
 )
@@ -96,11 +80,6 @@ def explore(
     criteria: tuple[str, ...],
     characteristic_length: float,
     limits: str | None,
-    com_x: float | None,
-    com_y: float | None,
-    com_z: float | None,
-    joints: tuple[str, ...],
-    at: tuple[str, ...],
     port: int,
     host: str,
     no_browser: bool,
@@ -130,6 +109,10 @@ def explore(
     from copsense.explore import Model, Setting, State
 
     within = read_limits(limits)
+    # The sliders begin where the options put the robot: the stance is the one before that.
+    asked = {f"com_{axis}": options.pop(f"com_{axis}") for axis in "xyz"}
+    joints, at = options.pop("joints"), options.pop("at")
+    kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
     stance = read_stance(robot, **options)
     file = remembered_stance()
     model = Model(
@@ -138,7 +121,6 @@ def explore(
         criteria=file.criteria or None if file else None,
         limits=file.limits if file else None,
     )
-    asked = {"com_x": com_x, "com_y": com_y, "com_z": com_z}
     coordinates = {n: Setting(v, "m") for n, v in asked.items() if v is not None}
     for name, value in read_positions(joints, stance.robot).items():
         coordinates[name] = Setting(value, stance.robot.joint_unit(name))
@@ -159,6 +141,10 @@ def explore(
         "own" if limits is None or within is None else within,
         frozenset({"curve"}),
     )
+    if kept is not None:
+        source, folders = (file.source, file.package_dirs) if file else (robot or "", ())
+        folders = options["package_dirs"] or folders
+        written(model.posture(state), kept, source, overwrite, folders)
     if export is not None:
         from copsense.explore.export import export_page
 

@@ -189,7 +189,7 @@ class Explorer:
         self._panel.reset()
 
     def _save(self) -> None:
-        from copsense.robots import save_stance
+        from copsense.robots import PRESETS, save_stance
 
         view = self.view
         if view is None:
@@ -200,12 +200,15 @@ class Explorer:
         while path.exists():
             number += 1
             path = Path(f"{name}-stance-{number}.toml")
-        words = self.model.words
+        words, origin = self.model.words, self.model.stance.robot.description
+        if words[0] in PRESETS:
+            origin = None  # it knows its own
         try:
             save_stance(
                 self.model.stance.at(view.q),
                 path,
-                robot=None if words[0].startswith("-") else words[0],
+                robot=words[0] if words[0] in PRESETS else None,
+                package_dirs=() if origin is None else origin.package_dirs,
                 limits=self.model.limits_of(state),
                 criteria=tuple(self.model.criteria_of(state).values()),
             )
@@ -216,7 +219,7 @@ class Explorer:
 
     def _from_above(self) -> None:
         self._panel.hide_robot(True)  # what counts is under it
-        self._move_cameras(np.array([-1e-3, 0.0, 0.6]), at_ground=True)
+        self._move_cameras(np.array([-1e-3, 0.0, 1.0]), at_ground=True)
 
     def _from_front(self) -> None:
         self._panel.hide_robot(False)

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from copsense.analysis.asked import asked_posture, determined_criteria
+from copsense.analysis.asked import asked_posture, determined_criteria, placed_stance
 from copsense.analysis.joint_notes import ROUNDING
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
@@ -167,11 +167,10 @@ class Model:
             found = chart.solve([list(state.at.values())])
             if not found.converged[0]:
                 raise unreachable(self.stance, state.at, str(found.reasons[0]))
-            stance = self.stance.at(found.configurations[0])
-            return asked_posture(stance, (None, None, None), None, None)[0]
+            return self.stance.at(found.configurations[0])
         joints = {} if state.at else state.joints
         com = (None, None, None) if state.at else state.com
-        return asked_posture(self.stance, com, joints, state.at)[0]
+        return placed_stance(self.stance, com, joints, state.at)
 
     def view(self, state: State, revision: int = 0, last: View | None = None) -> View:
         """What a state looks like, all but what the `stages` add.

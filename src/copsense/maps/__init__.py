@@ -9,11 +9,11 @@ from copsense.extras import require
 require("xarray", "a map")  # before the modules that import it
 
 from copsense.maps.map_plan import MapPlan
+from copsense.maps.map_stances import worst_stances
 from copsense.maps.map_statistics import CriterionSummary, FailedPosture, MapSummary, WorstPosture
 from copsense.maps.mapping import load_map, map_postures, map_summary
 from copsense.maps.marginals import Marginal, marginal
 from copsense.maps.sampling import Axis, Grid, Sample
-from copsense.maps.worst_stances import worst_stances
 
 __all__ = [
     "Axis",
