@@ -14,6 +14,7 @@ from jaxtyping import Float
 from copsense.arrays import check_type, finite_array, finite_number, read_only
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
+from copsense.magnitudes import LONGEST_SOLE, check_angle, check_length, in_radians
 from copsense.polygon import Polygon
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
@@ -71,7 +72,7 @@ class Plane:
             _require(
                 not steep,
                 f"the {what} of a slope is {np.degrees(angle):.4g} degrees. Give less than 90, or "
-                "a wall by its normal, Plane(point, normal)",
+                f"a wall by its normal, Plane(point, normal). {in_radians(angle).rstrip('.')}",
             )
         normal = pin.rpy.rpyToMatrix(float(roll), float(pitch), 0.0)[:, 2]
         x, y, z = (float(c) for c in normal)
@@ -134,6 +135,8 @@ class Contact(ShortRepr):
             f"contact {label!r} is of kind {self.kind!r}. Valid kinds: {', '.join(COMPONENTS)}",
         )
         offset = finite_array(self.offset, f"the offset of contact {label!r}", (3,), "x, y, z [m]")
+        for lever in offset.tolist():
+            check_length(lever, f"the offset of contact {label!r}")
         object.__setattr__(self, "offset", tuple(float(c) for c in offset))
         rotation = finite_array(self.rotation, f"the rotation of contact {label!r}", (3, 3))
         _require(
@@ -150,6 +153,8 @@ class Contact(ShortRepr):
                 f"the polygon of contact {label!r} is a single point. Give two or more, or make "
                 "the contact a point contact",
             )
+            for size in np.ptp(outline.vertices, axis=0).tolist():
+                check_length(size, f"the sole of contact {label!r}", LONGEST_SOLE)
             object.__setattr__(self, "polygon", outline.vertices)
         for what in ("friction", "torsional_friction"):
             value = getattr(self, what)
@@ -158,6 +163,9 @@ class Contact(ShortRepr):
                 number = finite_number(value, told)
                 _require(number >= 0, f"{told} is {value}. Give a non-negative number, or None")
                 object.__setattr__(self, what, number)
+        if self.torsional_friction is not None:
+            what = f"contact {label!r}: torsional_friction"
+            check_length(self.torsional_friction, what, LONGEST_SOLE)
 
     @property
     def components(self) -> tuple[int, ...]:
@@ -213,6 +221,8 @@ class Contact(ShortRepr):
         Its offset stays.
         """
         angles = [float(a) for a in finite_array((roll, pitch, yaw), "roll, pitch, yaw", (3,))]
+        for what, angle in zip(("roll", "pitch", "yaw"), angles, strict=True):
+            check_angle(angle, f"the {what} of contact {self.name!r}")
         return replace(self, rotation=pin.rpy.rpyToMatrix(*angles))
 
     def on(self, robot: Robot) -> Attachment:
@@ -245,6 +255,8 @@ def rectangle(
         finite_array(x, f"x {what}", (2,), need),
         finite_array(y, f"y {what}", (2,), need),
     )
+    check_length(float(x1 - x0), f"the length {what}", LONGEST_SOLE)
+    check_length(float(y1 - y0), f"the width {what}", LONGEST_SOLE)
     return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
 
 

@@ -23,6 +23,7 @@ from copsense.arrays import check_name, check_type, finite_array, finite_number
 from copsense.contact import Contact
 from copsense.content import ByContent
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.magnitudes import doubt_length
 from copsense.quadratic import Quadratic
 from copsense.robot import Robot
 from copsense.stance import Stance
@@ -324,6 +325,7 @@ def _norm_weights(characteristic_length: float) -> Float[np.ndarray, " 6"]:
             f"{what} is {length:g}: a force or a moment would count for nothing. Give a length "
             "between 1e-6 and 1e6; the paper means 1."
         )
+    doubt_length(length, what)
     moment = 1.0 / length**2
     return np.array([1.0, 1.0, 1.0, moment, moment, moment])
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.reach import chain_lengths
 from copsense.stance import RANK_TOLERANCE, Stance
 from copsense.unheld import moved_joints
 
@@ -35,12 +36,19 @@ def check_com_moves(stance: Stance, axis: int) -> None:
     Raises:
         InvalidInputError: no motion with the contacts in place moves it there.
     """
+    reason = com_held(stance, axis)
+    if reason:
+        raise InvalidInputError(reason)
+
+
+def com_held(stance: Stance, axis: int) -> str:
+    """Why no motion moves the centre of mass along an axis of the world, in words; else ""."""
     held = held_com_axes(stance)
     if axis not in held:
-        return
+        return ""
     free = [f"CoM {'xyz'[i]}" for i in range(3) if i not in held]
     lacking = "; ".join(missing_joints(stance))
-    raise InvalidInputError(
+    return (
         f"the contacts of {stance.robot.name!r} hold the CoM's {'xyz'[axis]} fast: no posture with "
         "them in place moves it."
         + (f" {lacking[0].upper()}{lacking[1:]}." if lacking else "")
@@ -57,15 +65,7 @@ def com_span(stance: Stance) -> float:
     """
     robot = stance.robot
     model = robot.model
-    lower, upper = robot.position_limits
-    steps = [float(np.linalg.norm(place.translation)) for place in model.jointPlacements]
-    steps[:2] = [0.0, 0.0]  # the universe, and where the file puts the base
-    reach = np.maximum(np.abs(lower), np.abs(upper))
-    for k in range(2, model.njoints):
-        first = model.joints[k].idx_v - robot.base_nv
-        own = range(first, first + model.joints[k].nv)
-        steps[k] += sum(float(reach[i]) for i in own if robot.dof_units[i] == "m")
-    far = [sum(steps[j] for j in model.supports[k]) for k in range(model.njoints)]
+    far = chain_lengths(robot)
     spread = sum(
         inertia.mass * (far[k] + float(np.linalg.norm(inertia.lever)))
         for k, inertia in enumerate(model.inertias)

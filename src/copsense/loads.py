@@ -6,6 +6,7 @@ that changes with the posture depends on what the wrench is fixed to (theory2.md
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -18,11 +19,15 @@ from copsense import rigid_body
 from copsense.arrays import check_name, finite_array, owned, read_only
 from copsense.content import FrozenMapping, ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.magnitudes import MagnitudeWarning, in_metres
+from copsense.reach import robot_reach
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
 FIXED_TO = ("world", "body")
 Vector = tuple[float, float, float]
+_WEIGHTS = 20.0  # of a robot, from which a force on it is doubted
+_LEVERS = 5.0  # times weight and reach, from which a moment is
 
 
 @dataclass(frozen=True)
@@ -140,6 +145,37 @@ def apply_loads(
         FrozenMapping(forces),
         read_only(derivative),
     )
+
+
+def doubt_loads(loads: Sequence[AnyLoad], applied: AppliedLoads, robot: Robot) -> None:
+    """Warn of loads that no robot carries, and that another unit may explain."""
+    reach = robot_reach(robot)
+    for load, wrench in zip(loads, applied.wrenches, strict=True):
+        force, moment = (float(np.linalg.norm(part)) for part in (wrench[:3], wrench[3:]))
+        away = float(np.linalg.norm(load.point))
+        said = []
+        if force > _WEIGHTS * robot.weight:
+            said.append(
+                f"its force is {force:.4g} N, {force / robot.weight:.3g} times the weight of "
+                f"{robot.name!r}. Forces are in newtons"
+                + (
+                    ", its anchor in metres, its stiffness in N/m."
+                    if isinstance(load, SpringLoad)
+                    else "."
+                )
+            )
+        if moment > _LEVERS * robot.weight * reach:
+            said.append(
+                f"its moment is {moment:.4g} Nm, {moment / robot.weight:.3g} m times the weight of "
+                f"{robot.name!r}. Moments are in Nm."
+            )
+        if away > 2 * reach:
+            said.append(
+                f"it acts {away:.4g} m from its frame, and {robot.name!r} reaches {reach:.2g} m. "
+                f"{in_metres(away)}"
+            )
+        for each in said:
+            warnings.warn(f"load {load.name!r}: {each}", MagnitudeWarning, stacklevel=3)
 
 
 def load_places(loads: Sequence[AnyLoad], robot: Robot) -> list[Attachment]:

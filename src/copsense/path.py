@@ -31,6 +31,7 @@ from copsense.errors import (
 )
 from copsense.freedom import check_com_moves, held_com_axes
 from copsense.posture import PostureCost, contact_error, pull_back, solve_posture
+from copsense.reach import SWEPT, check_within_reach
 from copsense.stance import Stance, check_at_rest, check_stance
 
 COM_COORDINATES = ("com_x", "com_y", "com_z")  # of the centre of mass in the world [m]
@@ -250,6 +251,11 @@ def com_sweep(
         if name != coordinate and name not in fast:  # where contacts hold it, it stays
             fixed.setdefault(name, float(middle[COM_COORDINATES.index(name)]))
     values = _grid(start, stop, count)
+    asked = [(coordinate, values[0]), (coordinate, values[-1])]
+    asked += [(name, fixed[name]) for name in held or {} if name in COM_COORDINATES]
+    for name, value in asked:
+        away = float(value - middle[COM_COORDINATES.index(name)])
+        check_within_reach(stance.robot, away, f"{name}, from the contacts,", SWEPT, value)
     axis = COM_COORDINATES.index(coordinate)
     check_com_moves(stance, axis)
     solver = _Along(stance, coordinate, fixed, cost)
@@ -297,6 +303,7 @@ class LateralPath:
         check_stance(stance)
         check_at_rest(stance, "a path of postures")
         reach = finite_number(reach, "the reach [m]", positive=True)
+        check_within_reach(stance.robot, reach, "the reach of a path", SWEPT)
         samples = whole_number(samples, "the samples of a search")
         self.stance = stance
         steps = np.linspace(-reach, reach, 2 * samples + 1)
@@ -371,6 +378,8 @@ def joint_sweep(
     now = robot.joint_position(stance.q, joint)
     fixed = _held(stance, joint, held)
     values = _grid(start, stop, count)
+    for end in (values[0], values[-1]):
+        robot.checked_position(joint, float(end))
     solver = _Along(stance, joint, fixed, cost)
     return _sweep(stance, joint, robot.joint_unit(joint), values, now, solver, progress)
 
@@ -456,8 +465,10 @@ def _held(stance: Stance, swept: str, held: Mapping[str, float] | None) -> dict[
     for name, value in (held or {}).items():
         if name == swept:
             raise InvalidInputError(f"{name} is both swept and held. Leave it out of held.")
-        unit = "m" if name in COM_COORDINATES else robot.joint_unit(name)
-        found[name] = finite_number(value, f"{name} [{unit}]")
+        if name in COM_COORDINATES:
+            found[name] = finite_number(value, f"{name} [m]")
+        else:
+            found[name] = robot.checked_position(name, value)
     return found
 
 

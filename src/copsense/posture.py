@@ -14,6 +14,7 @@ from copsense.arrays import check_type, checked_positions, finite_array, finite_
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
+from copsense.reach import beyond_reach
 from copsense.stance import RANK_TOLERANCE, Stance, check_at_rest, check_stance
 from copsense.unheld import moved_joints
 
@@ -114,7 +115,7 @@ def solve_posture(
         if value is not None
     ]
     for joint, position in joints.items():
-        joints[joint] = finite_number(position, f"the position of joint {joint!r}")
+        joints[joint] = robot.checked_position(joint, position)
     places = tuple(stance.placements if targets is None else targets)
     if len(places) != len(stance.contacts):
         raise InvalidInputError(
@@ -433,11 +434,26 @@ def _what_remains(
     if abs(h[worst]) < TOLERANCE:
         left = "they are in place, but the search for the nearest posture does not settle"
     lacking = "; ".join(missing_joints(stance))
+    middle = np.mean([place.translation for place in stance.placements], axis=0)
+    far = [
+        beyond_reach(
+            stance.robot,
+            value - middle[i],
+            f"the CoM's {'xyz'[i]}, from the contacts,",
+            given=value,
+        )
+        for i, value in wanted
+    ]
+    remedy = next((each for each in far if each), "")
     return (
         f"no posture of {stance.robot.name!r} with the contacts in place was found"
         + (f" for {asked}" if asked else "")
         + f": {left}. "
         + (f"{lacking[0].upper()}{lacking[1:]}. " if lacking else "")
-        + "Ask for less, start from a nearer posture, or leave out a contact that says what "
-        "another says already."
+        + (
+            f"{remedy[0].upper()}{remedy[1:]}"
+            if remedy
+            else "Ask for less, start from a nearer posture, or leave out a contact that says what "
+            "another says already."
+        )
     )

@@ -25,6 +25,7 @@ from copsense.arrays import (
 from copsense.description import Description, load_description
 from copsense.drives import Actuation, Drives
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.magnitudes import check_angle, check_joint_position, check_length, doubt_payload
 from copsense.mjcf import MjcfReading, read_mjcf
 from copsense.parser_output import caught_parser_output
 from copsense.sdf_model import read_sdf
@@ -273,6 +274,9 @@ class Robot:
         if kg < 0:
             raise InvalidInputError(f"the payload at {frame!r} is {mass} kg. Give it a mass.")
         place = finite_array(com, f"the centre of mass of the payload at {frame!r}", (3,), "[m]")
+        for lever in place.tolist():
+            check_length(lever, f"the centre of mass of the payload at {frame!r}")
+        doubt_payload(kg, self.name, self.mass, f"the payload at {frame!r}")
         about = np.zeros((3, 3))
         if inertia is not None:
             about = finite_array(inertia, f"the inertia of the payload at {frame!r}", (3, 3))
@@ -539,7 +543,7 @@ class Robot:
         displacement = np.zeros(self.model.nv)
         for joint, angle in (angles or {}).items():
             index = self.velocity_index(joint)
-            displacement[index] = finite_number(angle, f"the position of joint {joint!r}")
+            displacement[index] = self.checked_position(joint, angle)
         if base_yaw:
             if self.base_nv != 6:
                 raise InvalidInputError(
@@ -547,7 +551,22 @@ class Robot:
                     "base's orientation out."
                 )
             displacement[5] = finite_number(base_yaw, "the heading of the base")
+            check_angle(float(base_yaw), "the heading of the base")
         return pin.integrate(self.model, pin.neutral(self.model), displacement)
+
+    def checked_position(self, joint: str, position: object) -> float:
+        """One position of a joint [rad, or m for a prismatic joint].
+
+        Raises:
+            UnknownNameError: the joint is not in the model.
+            InvalidInputError: not a finite number, or one that only another unit explains, such as
+                degrees.
+        """
+        index = self.velocity_index(joint) - self.base_nv
+        number = finite_number(position, f"the position of joint {joint!r}")
+        lower, upper = (float(end[index]) for end in self.position_limits)
+        check_joint_position(number, joint, self.joint_unit(joint), lower, upper)
+        return number
 
     def check_configuration(self, q: object) -> Float[np.ndarray, " nq"]:
         """A read-only copy of a configuration that is finite, of the right size and normalised.

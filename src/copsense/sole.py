@@ -13,13 +13,14 @@ from copsense.arrays import finite_number
 from copsense.contact import Contact
 from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError, ModelLoadError
+from copsense.magnitudes import in_metres
 from copsense.polygon import Polygon
 from copsense.robot import Robot
 from copsense.shapes import Geometry, link_shapes, shape_points, whole_robot
 
 THICKNESS = 1e-3  # m: what lies within this of the lowest point belongs to the sole
 LEVEL = "turn the contact by its rotation, or level it (level_soles=True, --level-soles)"
-_STEEPEST = np.radians(30.0)  # a face that faces down within this may be a tilted underside
+_STEEPEST = np.radians(45.0)  # a face that faces down within this may be a tilted underside
 _UP = (0.0, 0.0, 1.0)
 _TIP = 1 / 6  # share of its foot's outline under which a sole is hardly all of it
 
@@ -88,6 +89,11 @@ def read_sole(
     finite_number(thickness, "the thickness of a sole [m]", positive=True)
     robot.frame(contact.frame)
     vertices = _foot_vertices(robot, contact, geometry)
+    if thickness > max(THICKNESS, float(np.ptp(vertices, axis=0).max())):
+        raise InvalidInputError(
+            f"the thickness of a sole is {thickness:g} m, more than all that is fixed to frame "
+            f"{contact.frame!r}. {in_metres(thickness)}"
+        )
     lowest = float(vertices[:, 2].min())
     sole = vertices[vertices[:, 2] <= lowest + thickness]
     outline = Polygon.hull(sole[:, :2], f"the sole of contact {contact.name!r}")
@@ -109,7 +115,7 @@ def levelled(robot: Robot, contact: Contact, *, geometry: Geometry = "collision"
     """The contact with its frame turned, by the smallest rotation, until its sole lies flat.
 
     A contact whose sole lies flat is returned as it is, as is one that is a point or whose
-    underside is more than 30 degrees off.
+    underside is more than 45 degrees off.
 
     Args:
         robot: a robot read from URDF or MJCF.

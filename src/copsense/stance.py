@@ -27,7 +27,15 @@ from copsense.errors import (
     OpenLoopError,
     UnknownNameError,
 )
-from copsense.loads import AnyLoad, AppliedLoads, Load, SpringLoad, apply_loads, turning
+from copsense.loads import (
+    AnyLoad,
+    AppliedLoads,
+    Load,
+    SpringLoad,
+    apply_loads,
+    doubt_loads,
+    turning,
+)
 from copsense.motion import Motion
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
@@ -163,7 +171,10 @@ class Stance:
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
         given = _known_loads(loads)
-        return Stance(self.robot, self.q, self.contacts, loads=given, motion=self.motion)
+        found = Stance(self.robot, self.q, self.contacts, loads=given, motion=self.motion)
+        if found.applied is not None:
+            doubt_loads(given, found.applied, self.robot)
+        return found
 
     def moving(self, velocity: ArrayLike, acceleration: ArrayLike) -> Stance:
         """The same stance in motion: what is solved on it carries the robot's inertia.

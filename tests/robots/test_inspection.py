@@ -4,6 +4,7 @@ The walkers are written with known feet, axes and soles: what is found is compar
 """
 
 import json
+import re
 import shlex
 import warnings
 
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 from support.commands import copsense
 from support.tiny import urdf as tiny
-from support.walkers import BIPED, FOUR, FULL, walker
+from support.walkers import BIPED, FOUR, FULL, PITCH_ONLY, walker
 
 import copsense as cs
 from copsense.robots import inspect_robot, soles_read
+from copsense.robots.heading import upright_base
 
 BACK = np.diag([-1.0, -1.0, 1.0])  # axes in which x is backward and y right
 SIDE = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # y forward, x right
@@ -234,3 +236,56 @@ def test_a_leg_whose_tip_has_no_frame_stands_on_its_tip(tmp_path):
     assert heights == pytest.approx([0.0] * 4, abs=1e-12)
     # The tips are 0.4 m to either side, not the hips at 0.2 m.
     assert abs(answer.json["contacts"][0]["position"][0]) == pytest.approx(0.4, abs=0.01)
+
+
+@pytest.mark.parametrize("tilt", [6.0, 40.0])
+def test_tilted_soles_are_named_with_their_angle_and_levelled_by_the_line(tmp_path, tilt):
+    turned = rf'\g<1>rpy="0 {np.radians(tilt)} 0"'
+    text = re.sub(r'(<collision><origin xyz="[^"]*" )rpy="[^"]*"', turned, walker())
+    found = inspect_robot(written(tmp_path, text))
+    for foot in found.feet:
+        said = f"tilted by {tilt:.1f} deg against frame {foot.frame!r}"
+        assert said in str(foot)
+        assert any(said in note and "--level-soles" in note for note in found.notes)
+    assert "--level-soles" in shlex.split(str(found.line))
+    assert f"turned by {tilt:.1f} deg to lie flat" in run(str(found.line)).err
+
+
+def test_a_foot_that_rests_on_its_edge_is_preferred_to_toes_that_reach_lower(tmp_path):
+    text = walker(limits={"pitch": (0.03, 0.2)})  # toes down by 4 degrees at rest
+    box = '<collision><origin xyz="0.02 0 0"/><geometry><box size="0.03 0.08 0.02"/></geometry>'
+    for side in "lr":
+        toe = (
+            f'<link name="{side}_toes"><inertial><mass value="0.1"/><inertia ixx="1e-4" ixy="0" '
+            f'ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>{box}</collision></link>'
+            f'<joint name="{side}_toe" type="revolute"><origin xyz="0.13 0 -0.04"/><parent '
+            f'link="{side}_foot"/><child link="{side}_toes"/><axis xyz="0 1 0"/>'
+            '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
+        )
+        text = text.replace("</robot>", toe)
+    found = inspect_robot(written(tmp_path, text))
+    assert [foot.frame for foot in found.feet] == BIPED
+
+
+def test_shins_tell_which_way_up_a_base_is_where_bent_knees_do_not():
+    """Knees 0.2 m under the trunk and 0.14 m behind its middle, shins straight down from them."""
+    legs = "".join(
+        f'<link name="{name}"><inertial><origin xyz="0 -0.17 0"/><mass value="0.5"/><inertia '
+        'ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>'
+        f'<joint name="{name}_knee" type="revolute"><origin xyz="{x} -0.2 {z - 0.14}"/><parent '
+        f'link="trunk"/><child link="{name}"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" '
+        'effort="9" velocity="9"/></joint>'
+        for name, (z, x) in FOUR.items()
+    )
+    trunk = (
+        '<link name="trunk"><inertial><mass value="12"/><inertia ixx="0.1" ixy="0" ixz="0" '
+        'iyy="0.1" iyz="0" izz="0.1"/></inertial></link>'
+    )
+    robot = cs.Robot.from_urdf(f'<robot name="y up">{trunk}{legs}</robot>')
+    assert upright_base(robot, robot.configuration()) == (90.0, 0.0, 0.0)
+
+
+def test_a_robot_whose_contacts_hold_the_com_sideways_says_so(tmp_path):
+    found = inspect_robot(written(tmp_path, walker(PITCH_ONLY)))
+    assert found.line is not None
+    assert any("hold the CoM's y fast" in note and "Move CoM x" in note for note in found.notes)

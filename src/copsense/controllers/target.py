@@ -21,6 +21,7 @@ from copsense.arrays import check_type, finite_number
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import held_com_axes
+from copsense.magnitudes import in_metres
 from copsense.path import COM_COORDINATES, PosturePath, com_sweep, lateral_sweep
 from copsense.stance import Stance, check_stance
 
@@ -287,7 +288,8 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     if max(abs(low), abs(high)) > stance.com[2] - ground:
         raise UnreachablePostureError(
             f"the reference leans from {low:g} m to {high:g} m, farther than the CoM of "
-            f"{stance.robot.name!r} is high ({stance.com[2] - ground:.2f} m). Give less, in metres."
+            f"{stance.robot.name!r} is high ({stance.com[2] - ground:.2f} m). "
+            f"{in_metres(max(abs(low), abs(high)))}"
         )
     low, high = min(low, -_SPACING), max(high, _SPACING)
     count = math.ceil((high - low) / _SPACING) + 1

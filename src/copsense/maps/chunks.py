@@ -6,6 +6,7 @@ import numpy as np
 
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
 from copsense.errors import CopsenseError, InfeasibleError
+from copsense.magnitudes import check_angle
 from copsense.maps.columns import (
     EVALUATED,
     INFEASIBLE,
@@ -20,8 +21,10 @@ from copsense.maps.columns import (
 )
 from copsense.maps.map_plan import MapPlan
 from copsense.maps.reduction import reduce_chunk
+from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore
 from copsense.margins import MarginTable, margin_table
+from copsense.reach import SWEPT, check_within_reach
 from copsense.statics import solve_equilibrium
 
 
@@ -41,6 +44,7 @@ class ChunkEvaluator:
         """
         self.plan = plan
         self._chart = PostureChart(plan.stance, plan.sampling.names)
+        _check_magnitudes(self._chart, plan.sampling)
         self._kernel = BatchKernel(plan.stance, plan.criteria)
         self._names = tuple(coordinate_columns(plan))
         self._columns = columns(plan)
@@ -130,3 +134,18 @@ def _largest_singular_value(G: np.ndarray) -> np.ndarray:
     """Of 2 x 2 matrices [[a, b], [c, d]]: (|(a+d, c-b)| + |(a-d, c+b)|) / 2."""
     a, b, c, d = G[..., 0, 0], G[..., 0, 1], G[..., 1, 0], G[..., 1, 1]
     return np.asarray((np.hypot(a + d, c - b) + np.hypot(a - d, c + b)) / 2)
+
+
+def _check_magnitudes(chart: PostureChart, sampling: Sampling) -> None:
+    """Reject coordinates that only another unit explains: no posture of theirs would be reached."""
+    robot = chart.stance.robot
+    for axis, unit, own in zip(sampling.axes, chart.units, chart.values.tolist(), strict=True):
+        for end in (axis.start, axis.stop):
+            if axis.name in robot.joint_names:
+                robot.checked_position(axis.name, end)
+            elif unit == "m":
+                check_within_reach(
+                    robot, end - own, f"{axis.name}, from the stance's own,", SWEPT, end
+                )
+            else:
+                check_angle(end, axis.name)

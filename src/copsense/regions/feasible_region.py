@@ -8,6 +8,8 @@ from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, limit_rows
 from copsense.load_problem import LoadProblem
+from copsense.magnitudes import in_metres
+from copsense.reach import robot_reach
 from copsense.regions.refinement import Point, refine
 from copsense.regions.region import BOX, MERGE, ComRegion, region_between
 from copsense.regions.support_program import SupportProgram
@@ -42,6 +44,11 @@ def com_region(stance: Stance, limits: Limits, *, tolerance: float = 1e-4) -> Co
         raise InvalidInputError(
             f"the tolerance is {tolerance:g} m, finer than linear programs resolve. Give "
             f"{FINEST:g} or more; vertices are exact where the region has few."
+        )
+    if tolerance > robot_reach(stance.robot) / 10:
+        raise InvalidInputError(
+            f"the tolerance is {tolerance:g} m, coarser than a region of {stance.robot.name!r} is "
+            f"wide. {in_metres(tolerance)}"
         )
     axes, load = com_axes(stance), LoadProblem.of(stance)
     slope = np.zeros((len(load.base_wrench), axes.shape[1]))

@@ -7,6 +7,7 @@ import shlex
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from copsense.contact import Contact, rectangle
 from copsense.content import freeze
 from copsense.drives import Drives
 from copsense.errors import CopsenseError
+from copsense.freedom import com_held
 from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt
 from copsense.robots.feet import Foot
@@ -42,7 +44,7 @@ class AnalyseLine:
         given: options that the caller gave, word by word: of motors, springs and the like, and of
             `own`.
         own: the contacts that the caller gave, instead of `contacts`.
-        level_soles: ``--level-soles``, of `own`.
+        level_soles: ``--level-soles``; of `own`, among the words given.
     """
 
     source: str
@@ -86,6 +88,8 @@ class AnalyseLine:
             words += ["--contact-offset", f"{frame}=" + ":".join(f"{c:g}" for c in place)]
         if self.contact_at is not None:
             words += ["--contact-at", self.contact_at]
+        if self.level_soles:
+            words.append("--level-soles")
         if self.soles != "collision":
             words += ["--soles", self.soles]
         if self.sole is not None:
@@ -148,12 +152,13 @@ def lines_to_try(
             sole=_GUESSED if unread else None,
             offsets={frame: offset for frame, offset in offsets.items() if any(offset)},
         )
-    for posture in postures:
-        yield replace(start, posture=posture)
+    tilted = not start.own and any(f.sole is not None and f.sole.tilt for f in surfaces)
+    for level, posture in product((True, False) if tilted else (start.level_soles,), postures):
+        yield replace(start, posture=posture, level_soles=level)
 
 
 def first_that_stands(
-    lines: Iterable[AnalyseLine], stand: Callable[[AnalyseLine], object]
+    lines: Iterable[AnalyseLine], stand: Callable[[AnalyseLine], Stance]
 ) -> tuple[AnalyseLine | None, str, tuple[str, ...]]:
     """The first line by which the robot stands plausibly, else the first by which it stands.
 
@@ -169,11 +174,13 @@ def first_that_stands(
         try:
             with warnings.catch_warnings(record=True) as said:
                 warnings.simplefilter("always")
-                stand(line)
+                stance = stand(line)
         except CopsenseError as error:
             reason = str(error)
             continue
-        notes = tuple(dict.fromkeys(str(each.message) for each in said))
+        # What most commands move is the CoM's y.
+        held = com_held(stance, 1) if stance.robot.base_nv == 6 else ""
+        notes = tuple(filter(None, dict.fromkeys([*(str(each.message) for each in said), held])))
         if not any(issubclass(each.category, ImplausibleStanceWarning) for each in said):
             return line, "", notes
         doubtful = doubtful or (line, "", notes)

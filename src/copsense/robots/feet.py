@@ -17,7 +17,7 @@ from copsense.robot import Robot
 from copsense.robots.contact_soles import sole_text
 from copsense.robots.uprighting import upright_contacts
 from copsense.shapes import Geometry, link_shapes, shape_points, whole_robot
-from copsense.sole import Sole, read_sole
+from copsense.sole import Sole, levelled, read_sole
 
 _LOW = 0.4  # share of the height under which a link's frames must reach to be looked at
 _NEAR = 0.05  # share of the height within which lowest points are on one ground
@@ -87,12 +87,20 @@ def find_feet(
     low = [j for j, z in bottoms.items() if z <= ground + near]
     # Of a foot and its toes, on the same ground, the one that stands on more.
     level = max(0.005, _LEVEL * (highest - ground))
-    chosen = []
+    feet = []
     for limb in _limbs(robot, low):
         bottom = min(bottoms[j] for j in limb)
-        foot_and_toes = [j for j in limb if bottoms[j] <= bottom + level]
-        chosen.append(max(foot_and_toes, key=lambda j: (_area(clouds.get(j)), -bottoms[j], j)))
-    feet = [_foot(robot, q, data, j, clouds.get(j), geometry) for j in chosen]
+        foot_and_toes = [
+            _foot(robot, q, data, j, clouds.get(j), geometry)
+            for j in limb
+            if bottoms[j] <= bottom + level
+        ]
+        feet.append(
+            max(
+                foot_and_toes,
+                key=lambda f: (_area(robot, f, geometry), -bottoms[f.joint], f.joint),
+            )
+        )
     if len(feet) > 2:
         feet = [f if f.sole is None or _width(f.sole) > _BALL else _as_point(f) for f in feet]
     placed = []
@@ -182,11 +190,14 @@ def _limbs(robot: Robot, joints: list[int]) -> list[list[int]]:
     return limbs
 
 
-def _area(points: Float[np.ndarray, "k 3"] | None) -> float:
-    if points is None:
+def _area(robot: Robot, foot: Foot, geometry: Geometry) -> float:
+    """Area [m^2] that a foot stands on where its sole lies flat."""
+    if foot.sole is None:
         return 0.0
-    sole = points[points[:, 2] <= points[:, 2].min() + _THICKNESS]
-    return float(Polygon.hull(sole[:, :2]).area)
+    flat = foot.sole
+    if flat.tilt:
+        flat = read_sole(robot, levelled(robot, foot.contact, geometry=geometry), geometry=geometry)
+    return float(Polygon(flat.polygon).area)
 
 
 def _foot(

@@ -35,16 +35,18 @@ def upright_base(robot: Robot, q: Float[np.ndarray, " nq"]) -> tuple[float, floa
     ends = [i for i in range(2, model.njoints) if len(model.subtrees[i]) == 1]
     if not ends:
         return (0.0, 0.0, 0.0)
+    # The last link reaches farther than its joint does: a shin hangs under its knee.
+    tips = {i: data.oMi[i].act(model.inertias[i].lever) for i in ends}
     # A limb counts once, however many fingers it has.
     limbs: dict[int, list[Float[np.ndarray, " 3"]]] = {}
     for i in ends:
-        limbs.setdefault(int(model.supports[i][2]), []).append(data.oMi[i].translation)
+        limbs.setdefault(int(model.supports[i][2]), []).append(tips[i])
     up = com - np.mean([np.mean(places, axis=0) for places in limbs.values()], axis=0)
     axis = int(np.argmax(np.abs(up)))
     sign = 1 if up[axis] > 0 else -1
     if (axis, sign) == (2, 1) or (axis != 2 and abs(up[axis]) < _PLAIN * abs(up[2])):
         return (0.0, 0.0, 0.0)
-    reach = max(float(np.linalg.norm(data.oMi[i].translation - com)) for i in ends)
+    reach = max(float(np.linalg.norm(tips[i] - com)) for i in ends)
     if abs(up[axis]) < _CLEAR * reach:
         return (0.0, 0.0, 0.0)  # limbs to all sides
     return _TURNS[axis, sign]

@@ -23,6 +23,7 @@ from copsense.robots.heading import bent_knees, facing, straight_legs, upright_b
 from copsense.robots.presets import PRESETS
 from copsense.robots.standing import load_robot, rest_positions
 from copsense.shapes import Geometry
+from copsense.sole import tilt_text
 
 _UPRIGHT = 0.9  # z of the base's z axis from which it is as good as up
 _BENDS = (30.0, 15.0, 60.0)  # deg, of a straight knee
@@ -242,9 +243,14 @@ def inspect_robot(
     rpy = (turn[0], turn[1], (360.0 - (heading or 0.0)) % 360.0)
     lines = lines_to_try(replace(start, base_rpy=rpy), feet, [*bent, {}])
     found, reason, said = first_that_stands(lines, lambda line: line.stand(robot, None, ()))
-    if found is None:  # else it was said when the robot stood
-        said = tuple(tip_text(f.contact, f.sole) for f in feet if f.sole and f.sole.is_tip)
+    levelled = not own and found is not None and found.level_soles
+    if found is None or levelled:  # else it was said when the robot stood
+        tips = (tip_text(f.contact, f.sole) for f in feet if f.sole and f.sole.is_tip)
+        said = (*said, *tips)
     notes += tuple(note for note in said if note not in notes)
+    if levelled:
+        tilted = [tilt_text(f.contact, f.sole.tilt) for f in feet if f.sole and f.sole.tilt]
+        notes += (f"{'; '.join(tilted)}: the line levels them (--level-soles).",)
     return Inspection(robot, joints, feet, heading, why, found, reason, (*robot.notes, *notes))
 
 

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
 
+from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.magnitudes import in_metres
+from copsense.reach import robot_reach
 from copsense.stance import Stance
 
 _TALL = 20.0  # m between contacts and CoM: no robot of metres is so tall
@@ -14,6 +20,8 @@ _SMALL = 5e-3  # m
 _LIGHT, _HEAVY = 0.1, 1e4  # kg
 _FAR_BEYOND = np.radians(10.0)  # rad beyond a joint's limit
 _FAR_SLID = 0.05  # m
+_THIN = 1 / 200  # of the robot's reach: a narrower sole is hardly all of it
+_FLIPPED = 0.5  # cosine under which a contact was not where its base was turned to: 60 degrees
 _UP = 0.1  # z of a contact's normal from which it stands on something
 _NAMED = 3  # joints that a doubt names
 
@@ -64,7 +72,63 @@ def check_plausible(stance: Stance) -> Stance:
 
 def plausibility_notes(stance: Stance) -> tuple[str, ...]:
     """What of a stance is hardly meant, in words; empty where all is plausible."""
-    return (*_size_notes(stance), *_joint_notes(stance), *_hanging_notes(stance))
+    return (
+        *_size_notes(stance),
+        *_sole_notes(stance),
+        *_joint_notes(stance),
+        *_hanging_notes(stance),
+    )
+
+
+def ceiling_notes(
+    contacts: Sequence[Contact], targets: Sequence[pin.SE3], com: Float[np.ndarray, " 3"]
+) -> list[str]:
+    """Doubts about planes that face down and lie under the robot, in words.
+
+    Args:
+        contacts: the contacts.
+        targets: where they will be, in the world.
+        com: the robot's centre of mass as it starts [m].
+    """
+    floor = min(float(target.translation[2]) for target in targets)
+    notes = []
+    for contact, target in zip(contacts, targets, strict=True):
+        facing = 1.0 if contact.plane is None else contact.plane.normal[2]
+        under = float(target.translation[2]) - floor <= abs(float(com[2]) - floor) / 2
+        if facing < -_UP and under:
+            notes.append(
+                f"The plane of contact {contact.name!r} faces down, as a ceiling does, and lies "
+                "at the height of the feet. A plane's normal points out of it, towards the robot: "
+                "a floor's is (0, 0, 1) (--plane FRAME=0:0:1)."
+            )
+    return notes
+
+
+def warn_of_turn(start: Stance, rpy: Float[np.ndarray, " 3"]) -> None:
+    """Warn where a base orientation turns the first sole away from its plane.
+
+    The robot is then turned back until that lies flat, and its heading is whatever comes of it.
+
+    Args:
+        start: the stance as the base was turned, before it is made to stand.
+        rpy: roll, pitch, yaw of the base as given [rad].
+    """
+    for contact, place in zip(start.contacts, start.placements, strict=True):
+        normal = np.array((0.0, 0.0, 1.0) if contact.plane is None else contact.plane.normal)
+        if contact.kind != "surface" or normal[2] <= _UP:
+            continue
+        cosine = float(np.clip(place.rotation[:, 2] @ normal, -1.0, 1.0))
+        if cosine < _FLIPPED:
+            given = ":".join(f"{angle:.4g}" for angle in np.degrees(rpy))
+            warnings.warn(
+                f"A base turned by {given} degrees has contact {contact.name!r} "
+                f"{np.degrees(np.arccos(cosine)):.0f} degrees off its plane; the robot was turned "
+                "back until it lies flat. Leave base_rpy (--base-rpy) out, or give it the yaw "
+                "alone (--base-yaw).",
+                ImplausibleStanceWarning,
+                stacklevel=3,
+            )
+        return
 
 
 def _size_notes(stance: Stance) -> list[str]:
@@ -80,6 +144,34 @@ def _size_notes(stance: Stance) -> list[str]:
         notes.append(
             f"The whole of {robot.name!r} weighs {robot.mass:.3g} kg: are its masses {grams}?"
         )
+    return notes
+
+
+def _sole_notes(stance: Stance) -> list[str]:
+    """Soles of another size than the robot."""
+    robot, notes = stance.robot, []
+    reach = robot_reach(robot)
+    for contact in stance.contacts:
+        away = float(np.linalg.norm(contact.offset))
+        if away > 2 * reach:
+            notes.append(
+                f"Contact {contact.name!r} is {away:.3g} m from its frame, and {robot.name!r} "
+                f"reaches {reach:.2g} m from its base. {in_metres(away)}"
+            )
+        if contact.sole is None or contact.kind != "surface":
+            continue
+        length, width = sorted(np.ptp(contact.sole.vertices, axis=0).tolist(), reverse=True)
+        if length > 2 * reach:
+            notes.append(
+                f"The sole of {contact.name!r} is {length:.3g} m long, and {robot.name!r} reaches "
+                f"{reach:.2g} m from its base. {in_metres(length)}"
+            )
+        if contact.sole.area and width < _THIN * reach:
+            notes.append(
+                f"The sole of {contact.name!r} is {length * 1e3:.3g} x {width * 1e3:.2g} mm, thin "
+                f"under a robot of {reach:.2g} m: is that the whole sole? Give the polygon "
+                "(--sole X0:X1:Y0:Y1), another frame, or a point contact."
+            )
     return notes
 
 

@@ -25,10 +25,18 @@ from copsense.description import is_file, load_description
 from copsense.drives import Drives
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
 from copsense.freedom import held_com_axes, missing_joints
+from copsense.magnitudes import check_angle
 from copsense.posture import pull_back, solve_posture
+from copsense.reach import check_within_reach
 from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt, complete_contacts
-from copsense.robots.plausibility import check_plausible, check_size
+from copsense.robots.plausibility import (
+    ImplausibleStanceWarning,
+    ceiling_notes,
+    check_plausible,
+    check_size,
+    warn_of_turn,
+)
 from copsense.robots.presets import PRESETS, preset_robot
 from copsense.robots.rigid_points import keep_distances
 from copsense.robots.uprighting import base_turn, upright_contacts
@@ -206,6 +214,8 @@ def load_stance(
     if base_rpy is not None:
         what = "base_rpy (--base-yaw, --base-rpy)"
         rpy = finite_array(base_rpy, what, (3,), "roll, pitch, yaw [rad]")
+        for angle in rpy.tolist():
+            check_angle(angle, what)
     else:
         rpy = np.array(preset.base_rpy if preset else base_turn(robot, chosen, q))
     q = _turn_base(robot, q, pin.rpy.rpyToMatrix(*[float(a) for a in rpy]))
@@ -214,6 +224,8 @@ def load_stance(
     chosen = complete_contacts(robot, upright, preset, contact_at, soles, level=level_soles)
     if width is None and preset and len(chosen) == len(preset.contacts):
         width = preset.width
+    if base_rpy is not None and np.any(rpy[:2]):
+        warn_of_turn(Stance(robot, q, chosen, check=False), rpy)
     return stand(robot, chosen, q, width=width)
 
 
@@ -264,6 +276,7 @@ def stand(
                     f"{len(contacts)}. Leave width out."
                 )
             finite_number(width, "the stance width [m]", positive=True)
+            check_within_reach(robot, width, "the stance width (width, --width)")
             left = place.translation[1] >= loose.placements[1 - k].translation[1]
             origin[:2] = 0.0, width / 2 if left else -width / 2
         normal = np.array(_plane(contact).normal)
@@ -271,8 +284,21 @@ def stand(
         targets.append(pin.SE3(flat @ place.rotation, origin - _height(contact, origin) * along))
     targets = keep_distances(robot, contacts, loose.placements, targets)
     centre = np.mean([targets[k].translation for k in ground], axis=0)
+    # Of two that are too far apart, the one whose plane was given is named.
+    for contact, target in sorted(
+        zip(contacts, targets, strict=True), key=lambda p: not p[0].plane
+    ):
+        away = float(np.linalg.norm(target.translation - centre))
+        check_within_reach(robot, away, f"contact {contact.name!r}, from the middle of the ground,")
     com = (None if planar else float(centre[0]), float(centre[1]), None)
-    return check_plausible(_settled(loose, targets, com))
+    doubts = ceiling_notes(contacts, targets, loose.com)
+    try:
+        found = _settled(loose, targets, com)
+    except UnreachablePostureError as error:
+        raise UnreachablePostureError(" ".join([str(error), *doubts])) from None
+    for doubt in doubts:
+        warnings.warn(doubt, ImplausibleStanceWarning, stacklevel=3)
+    return check_plausible(found)
 
 
 def _settled(

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from copsense.arrays import check_name, check_type, finite_array, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.magnitudes import doubt_payload
 from copsense.robot import Robot
 from copsense.stance import Stance
 
@@ -213,6 +214,7 @@ class ModelError:
                 scale * inertia.mass, inertia.lever, scale * inertia.inertia
             )
         for name, mass in self.payload.items():
+            doubt_payload(mass, robot.name, robot.mass, f"the payload at {name!r}")
             frame = robot.frame(name)
             point = pin.Inertia(mass, frame.placement.translation, np.zeros((3, 3)))
             model.inertias[frame.parentJoint] += point
