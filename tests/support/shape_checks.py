@@ -9,7 +9,7 @@ import dataclasses
 import inspect
 from collections import defaultdict
 from collections.abc import Sequence
-from functools import partial, wraps
+from functools import cache, partial, update_wrapper
 from types import FunctionType, SimpleNamespace
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -32,8 +32,10 @@ check = beartype(
     )
 )
 
-# Calls in this test, by code: a function made within another is a new one at every call of that.
-_calls = defaultdict(lambda: [0])
+# By code, as a function made within another is a new one at every call of that: how many of the
+# next calls are not checked, and how many of this test were.
+_turns = defaultdict(lambda: [0, 0])
+_counted = []  # those that are not as at the beginning of a test
 
 
 def install():
@@ -45,8 +47,9 @@ def install():
 
 def begin_test():
     """From here on, calls are the first ones again."""
-    for calls in _calls.values():
-        calls[0] = 0
+    for turn in _counted:
+        turn[:] = 0, 0
+    _counted.clear()
 
 
 def checked(it):
@@ -55,20 +58,61 @@ def checked(it):
         if dataclasses.is_dataclass(it) and inspect.isfunction(vars(it).get("__init__")):
             it.__init__ = checked(it.__init__)
         return it
-    calls, checking = _calls[it.__code__], None
+    turn, checking = _turns[it.__code__], None
 
-    @wraps(it)
-    def call(*arguments, **named):
+    def check_this_one(*arguments, **named):
         nonlocal checking
-        calls[0] = number = calls[0] + 1
-        if number > FIRST and number % EVERY:
-            return it(*arguments, **named)
+        if not turn[1]:
+            _counted.append(turn)
+        turn[1] += 1
+        turn[0] = 0 if turn[1] < FIRST else EVERY - 1
         if checking is None:
             checking = check(_with_known_hints(it))
         with _sizes():
             return checking(*arguments, **named)
 
+    return update_wrapper(_passing_on(it, turn, check_this_one), it)
+
+
+def _passing_on(it, turn, check_this_one):
+    """A function that passes its arguments on, or has them checked."""
+    code = it.__code__
+    if it.__defaults__ or it.__kwdefaults__ or code.co_flags & _GATHERS:
+
+        def call(*arguments, **named):
+            if turn[0]:
+                turn[0] -= 1
+                return it(*arguments, **named)
+            return check_this_one(*arguments, **named)
+
+        return call
+    return _by_name(code)(it, turn, check_this_one)
+
+
+_GATHERS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
+
+
+@cache
+def _by_name(code):
+    """The same for functions of this code: to gather and spread arguments takes longer."""
+    last = code.co_argcount
+    positional, named = code.co_varnames[:last], code.co_varnames[last:][: code.co_kwonlyargcount]
+    takes, gives = list(positional), [*positional, *(f"{name}={name}" for name in named)]
+    if code.co_posonlyargcount:
+        takes.insert(code.co_posonlyargcount, "/")
+    takes += ["*", *named] if named else []
+    text = f"""
+def passing_on(__it, __turn, __check):
+    def call({", ".join(takes)}):
+        if __turn[0]:
+            __turn[0] -= 1
+            return __it({", ".join(gives)})
+        return __check({", ".join(gives)})
     return call
+"""
+    made = {}
+    exec(compile(text, __file__, "exec"), made)
+    return made["passing_on"]
 
 
 # Within it a letter is one number, in all arguments and the answer. Jaxtyping's own decorator
