@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Collection
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +21,9 @@ from copsense.robot import Robot
 Geometry = Literal["collision", "visual"]
 
 _RIM = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)  # samples of a round rim
+
+# Asked for by every foot, and slow to build. It holds no description, which could not go then.
+_WHOLE: WeakKeyDictionary[Description, pin.Model] = WeakKeyDictionary()
 
 
 def whole_robot(robot: Robot) -> Robot:
@@ -40,9 +44,11 @@ def whole_robot(robot: Robot) -> Robot:
             "the shapes of an SDF are not read. Give the contacts their polygons "
             "(--sole X0:X1:Y0:Y1)."
         )
-    if robot.mjcf is None:
-        return Robot.from_description(description, name=robot.name)
-    return Robot(robot.name, robot.mjcf.model, description)
+    if robot.mjcf is not None:
+        return Robot(robot.name, robot.mjcf.model, description)
+    if description not in _WHOLE:
+        _WHOLE[description] = Robot.from_description(description).model
+    return Robot(robot.name, _WHOLE[description], description)
 
 
 def link_shapes(
@@ -131,12 +137,15 @@ def shape_points(
 
 
 def _only_shapes_of(description: Description, links: set[str], geometry: Geometry) -> str:
-    """The URDF with the geometry of these links alone, its meshes found."""
+    """The URDF with the geometry of these links and no more than it takes, its meshes found."""
     root = ET.fromstring(description.text)
+    for part in list(root):
+        if part.tag not in ("link", "joint", "material"):
+            root.remove(part)
     for link in root.iter("link"):
-        for shape in link.findall(geometry):
-            if link.get("name") not in links:
-                link.remove(shape)
+        for part in list(link):
+            if part.tag != geometry or link.get("name") not in links:
+                link.remove(part)
         for mesh in link.iterfind(f"{geometry}/geometry/mesh"):
             filename = mesh.get("filename", "")
             found = find_mesh(filename, description.package_dirs, description.path)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 from copsense.xml_names import wrong_names
@@ -210,12 +210,13 @@ def _end(joint: ET.Element, end: str) -> str | None:
 
 def _below(link: str, joints: list[ET.Element]) -> set[str]:
     """A link and all that hangs on it."""
+    children = defaultdict(list)
+    for joint in joints:
+        if (child := _end(joint, "child")) is not None:
+            children[_end(joint, "parent")].append(child)
     held, waiting = {link}, [link]
     while waiting:
-        parent = waiting.pop()
-        for joint in joints:
-            child = _end(joint, "child")
-            if _end(joint, "parent") == parent and child is not None and child not in held:
-                held.add(child)
-                waiting.append(child)
+        new = set(children[waiting.pop()]) - held
+        held |= new
+        waiting += new
     return held
