@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from copsense._version import __version__
@@ -168,5 +169,6 @@ def __dir__() -> list[str]:
     return sorted({*__all__, *_modules()})
 
 
-def _modules() -> set[str]:
-    return {module.name for module in pkgutil.iter_modules(__path__)}
+@cache
+def _modules() -> frozenset[str]:
+    return frozenset(module.name for module in pkgutil.iter_modules(__path__))
