@@ -229,14 +229,18 @@ def deadly(stance):
 """
 
 
-def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, monkeypatch):
-    (tmp_path / "own_controllers.py").write_text(OWN)
+def test_own_controllers_run_and_one_that_dies_takes_only_its_case(tmp_path, monkeypatch, capfd):
+    said = "import warnings\n\nwarnings.warn('mind the gap', FutureWarning)\n"
+    (tmp_path / "own_controllers.py").write_text(said + OWN)
     monkeypatch.chdir(tmp_path)
     controllers = [
         ControllerChoice("minimum-wrench", source=f"own_controllers:{name}", name=name)
         for name in ("deadly", "good", "bad")
     ]
-    table = run_benchmark(plan([REST], controllers), jobs=2)
+    with pytest.warns(FutureWarning, match="mind the gap") as warned:
+        table = run_benchmark(plan([REST], controllers), jobs=2)
+    assert len(warned) == 1  # of two processes and more
+    assert "mind the gap" not in capfd.readouterr().err  # not raw from a process
     table = table[table["score"] == "wrench_error"].set_index("controller")
     assert table.loc["deadly", "reason"] == "the process ended with exit code 3"
     assert "no idea" in table.loc["bad", "reason"]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
@@ -40,11 +42,13 @@ def run_in_processes(
 ) -> Iterator[tuple[Case, list[Score]]]:
     """Run cases in `jobs` processes, and yield each as it is done.
 
-    The processes end when the iteration ends, also by an interrupt. A process that dies, such as in
+    What they warn of is warned of here, once. The processes end when the iteration ends, also by an
+    interrupt. A process that dies, such as in
     a crash of a library, gives its case a failed row and is replaced.
     """
     waiting = list(reversed(cases))
     workers: dict[Connection, _Worker] = {}
+    warned: set[str] = set()
     try:
         while waiting or workers:
             while waiting and len(workers) < jobs:
@@ -61,6 +65,11 @@ def run_in_processes(
                     continue
                 if isinstance(answer, float):
                     progress(worker.case, answer)
+                    continue
+                if isinstance(answer, Warning):
+                    if str(answer) not in warned:
+                        warned.add(str(answer))
+                        warnings.warn(answer, stacklevel=2)
                     continue
                 yield worker.case, answer
                 if waiting:
@@ -114,6 +123,14 @@ class _Worker:
 def _work(link: Any, run: Run) -> None:
     """Answer cases with their scores until the connection is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process handles Ctrl-C
+
+    def send_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        try:
+            link.send(message if isinstance(message, Warning) else category(message))
+        except (TypeError, AttributeError, pickle.PicklingError):
+            link.send(UserWarning(str(message)))  # a category that cannot be sent
+
+    warnings.showwarning = send_warning
     with threadpool_limits(limits=1, user_api="blas"), shared_presets():
         try:
             while True:
