@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 import copsense
-from copsense.design import Family, design_criterion, families, joint_groups, score
+from copsense.design import (
+    LENGTHS,
+    Family,
+    design_criterion,
+    design_size,
+    families,
+    joint_groups,
+    score,
+    usual_grid,
+)
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import NO_LIMITS, Limits
 from copsense.scan import limit_travel
@@ -202,11 +211,27 @@ def test_criteria_that_fail_are_passed_over(icub_path):
         design_criterion(icub_path, COP_ONLY, never, grid=2)
 
 
-def test_progress_counts_the_grid(icub_path):
-    seen = []
-    family = families(icub_path.stances[0])["length"]
-    design_criterion(icub_path, COP_ONLY, family, grid=3, progress=seen.append)
-    assert seen == [1, 1, 1]
+def test_progress_counts_every_criterion_that_is_looked_at(four_bar_path, monkeypatch):
+    seen, scored = [], []
+    family = families(four_bar_path.stances[0])["joints"]
+    monkeypatch.setattr(
+        "copsense.design.score", lambda *given: scored.append(given[2]) or score(*given)
+    )
+    design_criterion(four_bar_path, COP_ONLY, family, grid=3, progress=seen.append)
+    assert sum(seen) == design_size(family, 3)
+    # The paper's two are scored twice, and each search's result once more.
+    assert seen.count(1) == len(scored) - 4 - 6
+    assert design_size(LENGTHS, 3) == 3 + 3 * 40
+
+
+def test_a_grid_is_coarser_in_more_dimensions(icub):
+    family = families(icub)["joints"]
+
+    def of(count):
+        names = tuple(f"p{i}" for i in range(count))
+        return replace(family, parameters=names, bounds=((0.1, 1.0),) * count)
+
+    assert [usual_grid(of(count)) for count in range(1, 8)] == [7, 7, 7, 4, 3, 2, 2]
 
 
 def test_what_a_design_rejects(icub_path, icub):

@@ -34,6 +34,7 @@ NO_LIMIT = "none within the path"  # a score's first limit where the path ends b
 _PARTS = ("hip", "knee", "ankle")
 _ROUNDING = 1e-9  # m
 _AT_BOUND = 1e-2  # of a parameter's logarithm: the search's resolution
+_GRID_POINTS = 343  # 7 values for each of three parameters
 _SIMPLEX = (0.5, 0.1, 0.02)  # first steps of the searches, in steps of the grid
 _SAME = 1e-6  # relative: less is not a gain
 _BAD = 1e3  # objective of a criterion that fails on the path
@@ -173,7 +174,7 @@ def design_criterion(
         objective: ``"travel"`` maximises the smallest travel to a limit; ``"gain"`` minimises the
             largest norm of dCoP/dCoM over the postures that both of the paper's criteria can hold.
         grid: values per parameter.
-        progress: called with 1 after each point of the grid.
+        progress: called with how many more criteria are done with, of `design_size` in all.
 
     Raises:
         UnreachablePostureError: the middle of the path was not reached.
@@ -226,7 +227,9 @@ def design_criterion(
         raise InvalidInputError(
             f"no criterion of the family {family.name!r} works along this path. Try another."
         )
-    other = _search(LENGTHS, judge, cost, grid)[1] if family.name != LENGTHS.name else None
+    other = (
+        _search(LENGTHS, judge, cost, grid, progress)[1] if family.name != LENGTHS.name else None
+    )
     candidates = (*looked, best)
     values = [best.parameters[name] for name in family.parameters]
     at_bound = tuple(
@@ -247,6 +250,32 @@ def design_criterion(
         path.stances[0].robot.name,
         (*path.stances[0].robot.notes, *part, *notes),
     )
+
+
+def design_size(family: Family, grid: int) -> int:
+    """How many criteria a design of a family looks at, at most.
+
+    Args:
+        family: the family.
+        grid: values per parameter.
+    """
+    searches = [family] if family.name == LENGTHS.name else [family, LENGTHS]
+    counts = [len(each.parameters) for each in searches]
+    return sum(grid**count + len(_SIMPLEX) * _calls(count) for count in counts)
+
+
+def usual_grid(family: Family) -> int:
+    """Values per parameter for which a grid has some hundred points, 7 at most.
+
+    The simplex searches go on from the best of them: 7 for up to three parameters, 4 for four.
+    """
+    points = len(family.parameters)
+    return max(2, *(n for n in range(2, 8) if n**points <= _GRID_POINTS))
+
+
+def _calls(parameters: int) -> int:
+    """Criteria that a simplex search looks at, at most."""
+    return 40 * parameters
 
 
 def _search(
@@ -279,16 +308,26 @@ def _search(
         if progress:
             progress(1)
     scores = [found for _, found in looked]
+    tell, most = progress or (lambda count: None), _calls(len(axes))
     if not looked:
+        tell(most * len(_SIMPLEX))
         return scores, None
     # Of equals, such as where the path ends before any limit, the one that strains least.
     where, best = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
     for size in _SIMPLEX:
+        calls = 0
+
+        def measure(logs: np.ndarray) -> float:
+            nonlocal calls
+            calls += 1
+            tell(1)
+            return cost(at(logs))
+
         # Inwards from a bound: clipped to it, the simplex would be flat and never leave it.
         step = size * (high - low) / (grid - 1)
         inwards = np.where(where + step <= high, step, -step)
         refined = scipy.optimize.minimize(
-            lambda logs: cost(at(logs)),
+            measure,
             where,
             method="Nelder-Mead",
             bounds=list(zip(low, high, strict=True)),
@@ -296,9 +335,10 @@ def _search(
                 "initial_simplex": np.vstack([where, where + np.diag(inwards)]),
                 "xatol": 1e-3,
                 "fatol": 1e-6,
-                "maxfev": 40 * len(axes),
+                "maxfev": most,
             },
         )
+        tell(most - calls)
         found = at(refined.x)
         if found and cost(found) < cost(best) - _ROUNDING:
             where, best = refined.x, found

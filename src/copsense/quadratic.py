@@ -55,9 +55,10 @@ class Quadratic(ShortRepr):
         """The same where `more` forces without a cost stand behind the contacts' forces."""
         if not more:
             return self
-        return replace(
-            self, wrench=np.pad(self.wrench, (0, more)), pull=np.pad(self.pull, (0, more))
-        )
+        m = len(self.pull)
+        wrench, pull = np.zeros((m + more, m + more)), np.zeros(m + more)
+        wrench[:m, :m], pull[:m] = self.wrench, self.pull  # `np.pad` takes ten times as long
+        return replace(self, wrench=wrench, pull=pull)
 
     def torque_weight(self, problem: LoadProblem) -> Float[np.ndarray, "n n"]:
         """W_tau = D + c M_j^-1.

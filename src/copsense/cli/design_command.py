@@ -43,9 +43,8 @@ _USUAL = "-0.09:0.09:37"  # of --com-y
 @click.option(
     "--grid",
     type=click.IntRange(min=2),
-    default=7,
-    show_default=True,
-    help="Values of each parameter.",
+    help="Values of each parameter; default 7, and fewer for more than three parameters, 343 "
+    "candidates in all at most.",
 )
 @click.option(
     "--plot",
@@ -64,7 +63,7 @@ def design(
     com_y: str | None,
     com_z: str | None,
     joints: tuple[str, ...],
-    grid: int,
+    grid: int | None,
     picture: str | None,
     force: bool,
     as_json: bool,
@@ -76,7 +75,7 @@ def design(
     where the travel begins); each candidate is judged by how far it goes before
     its own wrenches, unclipped, meet a limit.
     """
-    from copsense.design import design_criterion, family_named
+    from copsense.design import design_criterion, design_size, family_named, usual_grid
     from copsense.files import check_output
     from copsense.limits import Limits
     from copsense.path import com_sweep
@@ -96,9 +95,10 @@ def design(
     with progress_bar(max(count, 0), "postures") as update:
         held = course.held(stance.robot)
         path = com_sweep(stance, "com_y", start, stop, count, held=held, progress=update)
-    with progress_bar(grid ** len(chosen.parameters), "candidates") as update:
+    values = usual_grid(chosen) if grid is None else grid
+    with progress_bar(design_size(chosen, values), "candidates", "criterion") as update:
         found = design_criterion(
-            path, within, chosen, objective=objective, grid=grid, progress=update
+            path, within, chosen, objective=objective, grid=values, progress=update
         )
     echo_notes(note for note in found.notes if note not in stance.robot.notes)
     if picture is not None:
