@@ -41,8 +41,13 @@ _AT = click.option(
 )
 
 
-def place_options(command: F) -> F:
-    """Where the CoM and joints of a stance are put, contacts in place."""
+def place_options(command: F, *, coordinates: bool = True) -> F:
+    """Where the CoM and joints of a stance are put, contacts in place.
+
+    Args:
+        command: to be decorated.
+        coordinates: whether ``--at`` says it too; of `push` it is the frame that is pushed.
+    """
     options = [
         *(
             click.option(
@@ -61,7 +66,7 @@ def place_options(command: F) -> F:
             help="Put a joint there, contacts in place: degrees, or metres for a prismatic joint. "
             "Repeatable.",
         ),
-        _AT,
+        *([_AT] if coordinates else []),
     ]
     return with_options(options, command)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
@@ -20,7 +21,7 @@ from copsense.cli.stance_options import read_stance, stance_options
     "  copsense push icub --com-y 0.03 --joint torso_pitch=10 --payload l_hand=2\n"
     "  copsense push talos --at torso_2_link --point 0:0:0.2"
 )
-@stance_options
+@partial(stance_options, coordinates=False)  # --at is the frame that is pushed
 @criterion_options
 @click.option("--at", "frame", metavar="FRAME", help="The frame that is pushed; default the base.")
 @click.option(

@@ -23,9 +23,15 @@ if TYPE_CHECKING:
     from copsense.stance import Stance
 
 
-def stance_options(command: F) -> F:
-    """The robot, how it stands, where its CoM is put, and what it must respect."""
-    return click.argument("robot", required=False)(standing_options(place_options(command)))
+def stance_options(command: F, *, coordinates: bool = True) -> F:
+    """The robot, how it stands, where its CoM is put, and what it must respect.
+
+    Args:
+        command: to be decorated.
+        coordinates: whether it takes ``--at`` of `place_options`.
+    """
+    placed = place_options(command, coordinates=coordinates)
+    return click.argument("robot", required=False)(standing_options(placed))
 
 
 def swept_stance_options(command: F) -> F:

@@ -242,13 +242,40 @@ def create_map(path: Path, plan: MapPlan) -> MapStore:
 
 def _resumed(path: Path, parameters: dict[str, Any]) -> MapStore:
     store = open_map(path)
-    found = differences(store.parameters, json.loads(json.dumps(parameters)))
-    if found:
+    stored, asked = store.parameters, json.loads(json.dumps(parameters))
+    if differences(stored, asked):
         raise OutputError(
-            f"{path} is a map of other parameters: {worded(found)}. It was not touched. Give the "
-            "same parameters to resume it, or another path."
+            f"{path} is a map of other parameters: {_told(stored, asked)}. It was not touched. "
+            "Give the same parameters to resume it, or another path."
         )
     return store
+
+
+def _told(stored: dict[str, Any], asked: dict[str, Any]) -> str:
+    """What differs, in the words of the command where it has any."""
+    words, parts = [], (dict(stored), dict(asked))
+    there, here = (part.pop("sampling") for part in parts)
+    if differences(there, here):
+        words.append(f"it is over {_sampling(there)}, and asked for is {_sampling(here)}")
+    models = [part.get("robot", {}).get("model") for part in parts]
+    if models[0] != models[1]:
+        words.append("the robot's model, its drives or its loads are others")
+        parts = tuple({**part, "robot": {**part["robot"], "model": None}} for part in parts)  # type: ignore[assignment]
+    if rest := differences(*parts):
+        words.append(worded(rest))
+    return "; ".join(words)
+
+
+def _sampling(data: Mapping[str, Any]) -> str:
+    """Axes as ``--over`` has them [m, rad], and the sample."""
+    ranges = [
+        f"{axis['name']}={axis['start']:.10g}:{axis['stop']:.10g}"
+        + ("" if axis.get("count") is None else f":{axis['count']:g}")
+        for axis in data["axes"]
+    ]
+    if data.get("sequence"):
+        ranges.append(f"{data['count']} {data['sequence']} samples of seed {data['seed']}")
+    return ", ".join(ranges) + " [m, rad]"
 
 
 def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
