@@ -9,6 +9,7 @@ import pytest
 from support.commands import copsense as command
 
 import copsense
+from copsense.analysis.verdicts import verdict
 from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
 
@@ -197,3 +198,27 @@ def test_json_data_is_plain_and_finite():
         "a": [1.0, None],
         "b": [2.0, "x", True],
     }
+
+
+def test_criteria_that_go_equally_far_are_said_to(icub):
+    wrench = copsense.minimum_wrench(1.0)
+    alike = [wrench, wrench.named("again")]
+    assert copsense.analyse(icub, alike).verdict.startswith(
+        "minimum-wrench and again keep the feet planted equally long: to first order the CoM may"
+    )
+
+
+@pytest.mark.parametrize(
+    ("travels", "said"),
+    [
+        ((0.02, 0.02 * (1 + 1e-9), 0.01), "a and b meet their first limit equally late: the CoM "),
+        ((0.02, 0.0201, 0.01), "b is the last to meet a limit: the CoM may move 20.1 mm until x "),
+        ((None, None, 0.01), "a and b meet no limit within reach."),
+    ],
+)
+def test_the_same_holds_within_limits(travels, said):
+    rows = {
+        name: {"limit_travel": {"+y": [{"exact": travel, "name": "x"}]}}
+        for name, travel in zip("abc", travels, strict=True)
+    }
+    assert verdict({"criteria": rows}).startswith(said)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+_SAME = 1e-6  # share of a travel by which two are as long: they are exact to 1e-9 m
+
 
 def verdict(data: dict[str, Any]) -> str:
     """Which criterion keeps the feet planted longest, or meets its first limit last.
@@ -33,12 +35,17 @@ def verdict(data: dict[str, Any]) -> str:
             f"No sole is known under {', '.join(blind)}, so when it tips is not either: give "
             "--sole X0:X1:Y0:Y1."
         )
-    best = max(reach, key=lambda name: reach[name][0])
+    best, equal = _farthest(reach)
     distance, event = reach[best]
     if distance < 0:
         return f"Every criterion has a contact that tips or pulls; nearest to standing: {best}."
     if distance > data["com_span"]:
         return "No contact tips or unloads, to first order, wherever the CoM can go."
+    if equal:
+        return (
+            f"{_listed([best, *equal])} keep the feet planted equally long: to first order the CoM "
+            f"may move {distance * 1e3:.1f} mm before {event}{_others(reach, best, *equal)}."
+        )
     return (
         f"{best} keeps the feet planted longest: to first order the CoM may move "
         f"{distance * 1e3:.1f} mm before {event}{_others(reach, best)}."
@@ -58,18 +65,35 @@ def _within_limits(data: dict[str, Any]) -> str:
         )
         for name, row in data["criteria"].items()
     }
-    best = max(reach, key=lambda name: reach[name][0])
+    best, equal = _farthest(reach)
     distance, limit = reach[best]
     if distance == 0:
         return "Every criterion meets a limit here already."
     if not math.isfinite(distance):
-        return f"{best} meets no limit within reach."
+        every = _listed([best, *equal])
+        return f"{every} {'meet' if equal else 'meets'} no limit within reach."
+    if equal:
+        return (
+            f"{_listed([best, *equal])} meet their first limit equally late: the CoM may move "
+            f"{distance * 1e3:.1f} mm until {limit}{_others(reach, best, *equal)}."
+        )
     return (
         f"{best} is the last to meet a limit: the CoM may move {distance * 1e3:.1f} mm until "
         f"{limit}{_others(reach, best)}."
     )
 
 
-def _others(reach: dict[str, tuple[float, str]], best: str) -> str:
-    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n != best)
+def _farthest(reach: dict[str, tuple[float, str]]) -> tuple[str, list[str]]:
+    """The first criterion that lets the CoM go farthest, and others as far within rounding."""
+    most = max(distance for distance, _ in reach.values())
+    best, *equal = [n for n in reach if math.isclose(reach[n][0], most, rel_tol=_SAME)]
+    return best, equal
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _others(reach: dict[str, tuple[float, str]], *told: str) -> str:
+    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n not in told)
     return f" ({others})" if others else ""
