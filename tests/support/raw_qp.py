@@ -37,7 +37,7 @@ def raw_problem(case):
     zero = np.zeros(model.nv)
     weight = sum(body.mass for body in model.inertias) * 9.81
     G = pin.rnea(model, data, stance.q, zero, zero)
-    J = np.vstack([contact_jacobian(stance, contact) for contact in stance.contacts])
+    J = np.vstack([contact_jacobian(stance, data, contact) for contact in stance.contacts])
     m, n, nb = len(J), model.nv - model.joints[1].nv, model.joints[1].nv
     E = np.hstack([J.T, np.vstack([np.zeros((nb, n)), np.eye(n)])])
     P = np.zeros((m + n, m + n))
@@ -67,8 +67,8 @@ def raw_problem(case):
     return Raw(P / size, c / size, E, G / weight, C / norms[:, None], d / norms, weight, m)
 
 
-def contact_jacobian(stance, contact):
-    model, data = stance.robot.model, stance.robot.model.createData()
+def contact_jacobian(stance, data, contact):
+    model = stance.robot.model
     frame = model.getFrameId(contact.frame)
     on_frame = pin.SE3(np.array(contact.rotation), np.array(contact.offset))
     local = pin.computeFrameJacobian(model, data, stance.q, frame, pin.ReferenceFrame.LOCAL)
