@@ -23,7 +23,7 @@ from copsense.limits import limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.loads import SpringLoad
 from copsense.logs import JointsMap, Log, LogMap, WrenchMap, WrenchSeries, compare_log
-from copsense.logs.comparing import align_log
+from copsense.logs.aligned_log import align_log
 from copsense.maps import MapPlan
 from copsense.maps.map_statistics import CriterionSummary as Summary
 from copsense.maps.map_statistics import FailedPosture, MapSummary, WorstPosture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from copsense.cli.log_options import log_options, read_shown, read_subject
+from copsense.cli.log_options import encoders_option, log_options, read_shown, read_subject
 from copsense.cli.printing import echo_json, echo_notes, progress_bar
 from copsense.cli.units import read_quantity
 
@@ -32,6 +32,7 @@ from copsense.cli.units import read_quantity
     metavar="TIME",
     help="The log's beginning, which is left out.",
 )
+@encoders_option
 @click.option(
     "--postures",
     type=click.IntRange(min=20),
@@ -49,6 +50,7 @@ def identify(
     package_dirs: tuple[str, ...],
     at_rest: bool,
     skip: str,
+    encoders: str | None,
     postures: int,
     as_json: bool,
 ) -> None:
@@ -73,6 +75,7 @@ def identify(
             inertia=not at_rest,
             skip=after,
             postures=postures,
+            encoders=0.0 if encoders is None else read_quantity(encoders, "rad"),
             progress=advance,
         )
     if as_json:

@@ -8,7 +8,7 @@ import sys
 import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
-from copsense.cli.log_options import log_options, read_shown, read_subject
+from copsense.cli.log_options import encoders_option, log_options, read_shown, read_subject
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError
@@ -39,6 +39,7 @@ from copsense.errors import InvalidInputError
     metavar="TIME",
     help="The log's beginning, which is left out of the slopes.",
 )
+@encoders_option
 @click.option(
     "--rate",
     metavar="FREQUENCY",
@@ -71,6 +72,7 @@ def log(
     characteristic_length: float,
     base: str,
     skip: str,
+    encoders: str | None,
     rate: str | None,
     postures: int,
     picture: str | None,
@@ -119,6 +121,7 @@ def log(
             base=base,  # type: ignore[arg-type]
             skip=after,
             postures=postures,
+            encoders=0.0 if encoders is None else read_quantity(encoders, "rad"),
             advance=advance,
         )
     if picture is not None:

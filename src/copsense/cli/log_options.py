@@ -46,6 +46,14 @@ _OPTIONS = (
 )
 
 
+encoders_option = click.option(
+    "--encoders",
+    metavar="ANGLE",
+    help="Standard deviation of each encoder's constant error, such as 0.5deg, which the intervals "
+    "then have in them; default none.",
+)
+
+
 class LogSubject(NamedTuple):
     """Whose log a command reads.
 
@@ -69,7 +77,7 @@ def read_subject(
     robot: str, contacts: tuple[str, ...], package_dirs: tuple[str, ...]
 ) -> LogSubject:
     """The robot and contacts that the options name."""
-    from copsense.logs.comparing import log_robot
+    from copsense.logs.aligned_log import log_robot
 
     on, known = log_robot(robot, package_dirs)
     named = {contact.name: contact for contact in known}

@@ -2,11 +2,12 @@
 
 from copsense.identification.fitting import fit_family
 from copsense.identification.identifying import Identification, identify
-from copsense.identification.log_identification import identify_log
-from copsense.identification.measurements import Measurements
+from copsense.identification.log_identification import identify_log, log_measurements
+from copsense.identification.measurements import EncoderErrors, Measurements
 from copsense.identification.parameter_fit import Estimate, ParameterFit
 
 __all__ = [
+    "EncoderErrors",
     "Estimate",
     "Identification",
     "Measurements",
@@ -14,4 +15,5 @@ __all__ = [
     "fit_family",
     "identify",
     "identify_log",
+    "log_measurements",
 ]

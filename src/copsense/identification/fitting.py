@@ -30,6 +30,7 @@ _UNKNOWN = math.log(10.0)  # half-width of an interval, of a logarithm, from whi
 _HALVINGS = 6
 _AT_BOUND = 1e-3  # of a logarithm
 _BLOCKS = 5
+_NORMAL = 1.959964  # standard deviations of a normal number that hold 95 %
 _TINY = 1e-12
 _EXACT = 1e-3  # of its own spread: no channel is believed better than that
 _FEW = 40  # rows that a coarse grid is looked at by
@@ -240,7 +241,8 @@ def _result(
     reach = _student(effective, len(u))
     seen = s > reach / _UNKNOWN
     covariance = (vt[seen].T / s[seen] ** 2) @ vt[seen]
-    half = reach * np.sqrt(np.diag(covariance))
+    by_encoders = _by_encoders(family, u, measurements, values, X, weights, vt[seen].T)
+    half = np.hypot(reach * np.sqrt(np.diag(covariance)), _NORMAL * by_encoders)
     low, high = np.log(np.array(family.bounds)).T
     estimates = {}
     for i, name in enumerate(family.parameters):
@@ -254,7 +256,7 @@ def _result(
         elif blind:
             estimates[name] = Estimate(value, math.nan, math.nan, "not identified")
         else:
-            estimates[name] = Estimate(value, *ends)
+            estimates[name] = Estimate(value, *ends, encoders=float(by_encoders[i]))
     criterion = built(family, u)
     return ParameterFit(
         family.name,
@@ -269,6 +271,33 @@ def _result(
         steps,
         converged,
     )
+
+
+def _by_encoders(
+    family: Family,
+    u: np.ndarray,
+    measurements: Measurements,
+    values: np.ndarray,
+    X: np.ndarray,
+    weights: np.ndarray,
+    V: np.ndarray,
+) -> Float[np.ndarray, " p"]:
+    """Standard deviation of each logarithm by the encoders' constant errors.
+
+    An error changes what is left, y - p, by D; least squares over the directions seen then move by
+    V (X V)^+ D, for each encoder, and the squares add up.
+    """
+    errors = measurements.encoders
+    if errors is None or not V.shape[1]:
+        return np.zeros(len(u))
+    rest = (measurements.values - values)[errors.rows]
+    inverse = V @ np.linalg.pinv(_centred(X[errors.rows]).reshape(-1, len(u)) @ V)
+    square = np.zeros(len(u))
+    for shifted in errors.shifted:
+        there, _ = predict(built(family, u), shifted)
+        change = _centred(shifted.values - there - rest) * weights
+        square += (inverse @ change.reshape(-1)) ** 2
+    return np.sqrt(square)
 
 
 def _centred(values: np.ndarray) -> np.ndarray:

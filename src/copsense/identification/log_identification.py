@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Int
+
 from copsense.arrays import check_type, finite_number, whole_number
 from copsense.contact import Contact
 from copsense.design import Family
@@ -12,8 +15,11 @@ from copsense.errors import InvalidInputError
 from copsense.identification.fitting import Progress
 from copsense.identification.identifying import Identification, identify
 from copsense.identification.measurements import Measurements
-from copsense.logs.comparing import SKIPPED, align_log
+from copsense.logs.aligned_log import AlignedLog, align_log
+from copsense.logs.comparing import SKIPPED
+from copsense.logs.encoder_bias import biased_records, encoder_error, some_rows
 from copsense.logs.log import Log
+from copsense.logs.log_motion import LogMotion
 from copsense.robot import Robot
 from copsense.stance import Stance
 
@@ -29,6 +35,7 @@ def identify_log(
     inertia: bool = True,
     skip: float = SKIPPED,
     postures: int = ROWS,
+    encoders: float = 0.0,
     progress: Progress = lambda _: None,
 ) -> Identification:
     """Which criterion of some families explains a log, as ``copsense identify`` does.
@@ -41,13 +48,51 @@ def identify_log(
         inertia: whether the recorded motion's inertia is in the loads.
         skip: the log's beginning that is left out [s].
         postures: how many rows are evaluated at most, evenly chosen.
+        encoders: as of `copsense.logs.compare_log`.
         progress: called with the rows evaluated.
 
     Raises:
         CopsenseError: as `compare_log` and `identify`.
     """
+    measured = log_measurements(
+        log,
+        robot,
+        contacts=contacts,
+        inertia=inertia,
+        skip=skip,
+        postures=postures,
+        encoders=encoders,
+    )
+    return identify(measured, families, progress=progress)
+
+
+def log_measurements(
+    log: Log,
+    robot: str | Path | Robot | Stance,
+    *,
+    contacts: Sequence[str | Contact] | None = None,
+    inertia: bool = True,
+    skip: float = SKIPPED,
+    postures: int = ROWS,
+    encoders: float = 0.0,
+) -> Measurements:
+    """The rows of a log that `identify_log` fits, for `fit_family` and `identify`.
+
+    Args:
+        log: as of `identify_log`, like all others.
+        robot: the robot.
+        contacts: its contacts.
+        inertia: whether the recorded motion's inertia is in the loads.
+        skip: the log's beginning that is left out [s].
+        postures: how many rows are evaluated at most, evenly chosen.
+        encoders: standard deviation of each encoder's constant error [rad, or m].
+
+    Raises:
+        CopsenseError: as `compare_log`, or nothing was measured that moves.
+    """
     check_type(log, Log, "a log", "Give what copsense.logs.read_log returns.")
     skip = finite_number(skip, "the beginning of a log to skip [s]")
+    encoders = encoder_error(encoders)
     postures = whole_number(postures, "the number of postures of a log", least=20)
     aligned = align_log(log, robot, contacts=contacts, postures=len(log.times))
     late = log.times[aligned.rows] >= skip
@@ -58,12 +103,32 @@ def identify_log(
     every = -(-int(late.sum()) // postures)
     rows, motion = aligned.rows[late][::every], aligned.motion
     torques = None if aligned.torques is None else aligned.torques[late][::every]
-    stances = []
+    stances = _stances(aligned, motion, rows, inertia)
+    measured = Measurements.of(stances, aligned.wrenches[rows], torques)
+    if encoders:
+        some = some_rows(rows)
+        measured = measured.with_encoders(
+            some,
+            (
+                (
+                    _stances(aligned, there, np.arange(len(some)), inertia),
+                    wrenches,
+                    None if torques is None else torques[some],
+                )
+                for there, wrenches in biased_records(log, aligned, rows[some], encoders)
+            ),
+        )
+    return measured
+
+
+def _stances(
+    aligned: AlignedLog, motion: LogMotion, rows: Int[np.ndarray, " K"], inertia: bool
+) -> list[Stance]:
+    found = []
     for row in rows:
         # The feet are where the joints put them, millimetres off one plane.
         here = Stance(aligned.robot, motion.configurations[row], aligned.contacts, check=False)
         if inertia:
             here = here.moving(motion.velocities[row], motion.accelerations[row])
-        stances.append(here)
-    measured = Measurements.of(stances, aligned.wrenches[rows], torques)
-    return identify(measured, families, progress=progress)
+        found.append(here)
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -25,12 +25,15 @@ class Estimate:
         state: ``"identified"``; ``"not identified"``: the measurements do not see it, and it stays
             where it was; ``"none"``: it went to its bound, so that what it scales is not there;
             ``"at bound"``: it went to the other bound.
+        encoders: standard deviation that the encoders' constant errors give the parameter's
+            logarithm; it is in the interval.
     """
 
     value: float
     low: float
     high: float
     state: str = "identified"
+    encoders: float = 0.0
 
     def __str__(self) -> str:
         """Value and interval, or why there is none."""
@@ -94,10 +97,7 @@ class ParameterFit(ShortRepr):
         """Plain data."""
         return {
             "family": self.family,
-            "parameters": {
-                name: {"value": e.value, "low": e.low, "high": e.high, "state": e.state}
-                for name, e in self.estimates.items()
-            },
+            "parameters": {name: asdict(e) for name, e in self.estimates.items()},
             "singular_values": self.singular_values.tolist(),
             "directions": self.directions.tolist(),
             "not_seen": list(self.unseen_text),

@@ -49,6 +49,8 @@ class LogComparison:
             times `distance`) and ``"CoP x of NAME"``, ``"CoP y of NAME"`` (per travel); sources:
             ``"measured"`` and the names of `statics`.
         skipped: how long the log's beginning was left out of the slopes [s].
+        encoders: standard deviation of each encoder's constant error that is in the intervals
+            [rad]; 0 where it was left out.
         findings: what is missing or does not fit.
         notes: how it was done, a sentence each.
     """
@@ -70,6 +72,7 @@ class LogComparison:
     sway: Sway | None
     slopes: Mapping[str, Mapping[str, SlopeEstimate]]
     skipped: float
+    encoders: float
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
 
@@ -128,6 +131,7 @@ class LogComparison:
             "base": self.base,
             "smoothing": self.window,
             "skipped": self.skipped,
+            "encoders": self.encoders,
             "weight": self.weight,
             "normal_force": {"mean": float(normal.mean()), "deviation": float(normal.std())},
             "feet_distance": self.distance,

@@ -221,6 +221,12 @@ def smooth_motion(
     return LogMotion(configurations, v, acceleration, wide & known, window * step)
 
 
+def com_rows(robot: Robot, q: Float[np.ndarray, "N nq"]) -> Float[np.ndarray, "N 3"]:
+    """The centre of mass of every row."""
+    data = robot.model.createData()
+    return np.array([pin.centerOfMass(robot.model, data, row) for row in q])
+
+
 def _put(q: np.ndarray, pose: pin.SE3) -> None:
     q[:3] = pose.translation
     q[3:7] = pin.Quaternion(pose.rotation).normalized().coeffs()

@@ -9,7 +9,7 @@ to 95 %, where those that take every sample for independent cover it in 53 to 60
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,8 +17,11 @@ from jaxtyping import Float
 
 from copsense.errors import InvalidInputError
 
+LEAST = 20  # rows from which slopes are fitted
+STILL = 1e-3  # m of travel under which nothing sways
 _EXPLAINED = 0.6  # share of the travel's variance from which a sway has one frequency
 _HIGHEST = 5.0  # Hz
+_NORMAL = 1.959964  # standard deviations of a normal number that hold 95 %
 _PERIODS = 1.5  # at least as many periods
 
 
@@ -52,6 +55,8 @@ class SlopeEstimate:
         middle: the output with the centre of mass in the middle of its travel.
         samples: how many were fitted.
         effective: how many independent ones they are worth.
+        encoders: standard deviation that the encoders' constant errors give the value; it is in
+            the interval.
     """
 
     value: float
@@ -61,10 +66,16 @@ class SlopeEstimate:
     middle: float
     samples: int
     effective: float
+    encoders: float = 0.0
 
     def __repr__(self) -> str:
         """Value and interval."""
         return f"{type(self).__name__}({self.value:.4g} [{self.low:.4g}, {self.high:.4g}])"
+
+    def widened(self, encoders: float) -> SlopeEstimate:
+        """The same with a standard deviation of the encoders' in its interval, as a square."""
+        half = math.hypot(0.5 * (self.high - self.low), _NORMAL * encoders)
+        return replace(self, low=self.value - half, high=self.value + half, encoders=encoders)
 
     def place_of(self, other: SlopeEstimate) -> Literal["inside", "on the edge", "outside"]:
         """Where another slope lies against this interval: on the edge if only intervals meet."""
@@ -82,6 +93,7 @@ class SlopeEstimate:
             "middle": self.middle,
             "samples": self.samples,
             "effective_samples": self.effective,
+            "encoders": self.encoders,
         }
 
 

@@ -12,7 +12,7 @@ from copsense.criterion import minimum_torque, minimum_wrench
 from copsense.identification import Estimate, Identification, identify_log
 from copsense.identification.log_identification import ROWS
 from copsense.logs import LogComparison, compare_log, read_log
-from copsense.logs.comparing import POSTURES, log_robot
+from copsense.logs.aligned_log import POSTURES, log_robot
 from copsense.logs.log_comparison import MEASURED
 from copsense.paper.reproduce.clock import Clock
 from copsense.stiffness import stiffness
