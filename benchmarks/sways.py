@@ -2,8 +2,8 @@
 
     python benchmarks/sways.py
 
-The iCub sways under minimum torque, once by the torques of its equilibria in motion and once under
-the momentum-based controller. Takes about two minutes.
+The iCub sways under minimum torque, by the momentum-based controller of the paper and by the same
+with the acceleration of the reference's posture. Takes about two minutes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from copsense.controllers import BalancingController, Sine, lateral_reference
 from copsense.simulation import MujocoSimulator, Scenario, rollout
 from copsense.simulation.prediction import predict
 from copsense.simulation.sway_comparison import sway_slopes
-from copsense.simulation.sway_controller import SwayController
 
 SWAYS = ((0.02, 0.1), (0.02, 0.2), (0.012, 0.5))  # m, Hz
 TEXT = """# Sways in simulation
@@ -26,9 +25,10 @@ TEXT = """# Sways in simulation
 Written by `benchmarks/sways.py`. The iCub sways its centre of mass under minimum torque in MuJoCo;
 the fundamental of a foot's load, and of its centre of pressure, per that of the centre of mass over
 the last period. *off* is how far the measured slope is from the predicted one, with the inertia of
-the sway and without.
+the sway and without. *With feedforward* the controller knows the acceleration of the reference's
+posture (`--feedforward`); *as in the paper* it knows that of the centre of mass.
 
-| torques | sway | output | measured | in motion | off | at rest | off |
+| controller | sway | output | measured | in motion | off | at rest | off |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 
@@ -41,8 +41,8 @@ def main() -> None:
         reference = lateral_reference(stance, Sine(amplitude, frequency))
         prediction = predict(reference, criterion)
         controllers = {
-            "of the equilibria in motion": SwayController(reference, criterion),
-            "momentum-based controller": BalancingController(stance, criterion),
+            "with feedforward": BalancingController(stance, criterion, feedforward=True),
+            "as in the paper": BalancingController(stance, criterion),
         }
         for name, controller in controllers.items():
             scenario = Scenario((1.0 if frequency < 0.2 else 1.5) / frequency, reference)

@@ -7,21 +7,20 @@ import pytest
 from support.commands import copsense as command
 
 import copsense
-from copsense.controllers import Hold, Sine, lateral_reference
-from copsense.errors import InvalidInputError
+from copsense.controllers import BalancingController, Hold, Ramp, Sine, lateral_reference
 from copsense.simulation import MujocoSimulator, Scenario, rollout
 from copsense.simulation.prediction import predict
 from copsense.simulation.sway_comparison import compare_sway, sway_slopes
-from copsense.simulation.sway_controller import SwayController
+from copsense.simulation.timed_prediction import timed_note
 
 TORQUE = copsense.minimum_torque()
 
 
 @pytest.fixture(scope="module")
 def swayed(icub):
-    """One period of 12 mm at 0.5 Hz, by the torques of the equilibria in motion."""
+    """One period of 12 mm at 0.5 Hz, by a controller that knows the posture's acceleration."""
     reference = lateral_reference(icub, Sine(0.012, 0.5))
-    controller = SwayController(reference, TORQUE)
+    controller = BalancingController(icub, TORQUE, feedforward=True)
     recording = rollout(MujocoSimulator(icub), controller, Scenario(2.0, reference), until="fall")
     return predict(reference, TORQUE).attach(recording)
 
@@ -48,10 +47,11 @@ def test_a_recording_says_both_predictions(swayed):
 
 
 def test_only_a_sine_has_a_prediction_in_motion(icub):
-    still = predict(lateral_reference(icub, Hold()), TORQUE)
+    still_reference = lateral_reference(icub, Hold())
+    still = predict(still_reference, TORQUE)
     assert still.in_motion is None
-    with pytest.raises(InvalidInputError, match="is not a sway"):
-        SwayController(lateral_reference(icub, Hold()), TORQUE)
+    assert timed_note(still_reference) == ""
+    assert "Ramp" in timed_note(lateral_reference(icub, Ramp(0.004)))
 
 
 def test_the_prediction_in_motion_is_at_rest_what_statics_say_when_slow(icub):
@@ -60,6 +60,18 @@ def test_the_prediction_in_motion_is_at_rest_what_statics_say_when_slow(icub):
     assert inside.sum() > 5
     np.testing.assert_allclose(found.in_motion.cops[inside], found.cops[inside], atol=1e-7)
     np.testing.assert_allclose(found.in_motion.loads[inside], found.loads[inside], atol=1e-3)
+
+
+def test_a_ramp_is_predicted_at_rest_and_says_so():
+    run = ("balance", "solo12", "--reference", "ramp:0.001", "--duration", 0.02, "--json")
+    answer = command(*run)
+    assert not answer.json["sway"].get("slope")
+    assert "note: a Ramp has no prediction in motion" in answer.err
+
+
+def test_feedforward_is_the_built_in_controllers():
+    run = ("balance", "solo12", "--controller", "mine:Own", "--feedforward")
+    assert "--feedforward belongs to the built-in controller" in command(*run).error
 
 
 def test_the_command_says_the_slopes_of_a_sway():

@@ -75,6 +75,13 @@ def small_log(icub) -> Log:
     return Log("made up", times, names, positions, sensors, torques=0 * positions)
 
 
+def with_encoders(icub) -> Measurements:
+    """The same, with one encoder's error that changes nothing."""
+    measured, rows = swaying(icub), np.arange(20)
+    found = [copsense.solve_equilibrium(stance, TORQUE).wrenches for stance in measured.stances]
+    return measured.with_encoders(rows, [(measured.stances, np.array(found), None)])
+
+
 def swaying(icub) -> Measurements:
     """Load shares of a sway at rest."""
     stances = copsense.lateral_sweep(icub, -0.02, 0.02, 20).stances
@@ -154,6 +161,7 @@ def all_results(icub) -> dict[str, object]:
         "controller": BalancingController(icub, TORQUE),
         "recording": copsense.balance(icub, TORQUE, Scenario(0.02)),
         "log": small_log(icub),
+        "measurements with encoders": with_encoders(icub),
         "aligned log": align_log(small_log(icub), icub),
         "preload": PreloadTerm(np.zeros((2, 6))),
         "measurements": swaying(icub),

@@ -64,6 +64,12 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     "--duration", type=TIME, metavar="TIME", help="Default: one period, the ramp and 1 s, or 2 s."
 )
 @controller_options
+@click.option(
+    "--feedforward",
+    is_flag=True,
+    help="The built-in controller knows the acceleration of the reference's posture too; the "
+    "paper's knows that of the CoM.",
+)
 @control_period_option
 @click.option(
     "--wrenches",
@@ -92,6 +98,7 @@ def balance(
     reference: str,
     duration: float | None,
     gains: str,
+    feedforward: bool,
     gain: tuple[str, ...],
     controller: str | None,
     control_period: float,
@@ -138,6 +145,11 @@ def balance(
         name=reference,
         **read_disturbances(options),
     )
+    if feedforward and controller is not None:
+        raise InvalidInputError(
+            "--feedforward belongs to the built-in controller, and --controller names yours. Leave "
+            "one of them out."
+        )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
     scenario.check_stance(stance)
     criterion = read_criterion(criteria, characteristic_length)
@@ -151,6 +163,7 @@ def balance(
             scenario,
             limits=allowed,
             gains=read_gains(gains, gain, stance.robot),
+            feedforward=feedforward,
             controller=own,
             until=until,
             wrenches=wrenches,

@@ -64,6 +64,7 @@ def identify(
     from copsense.identification import identify_log
 
     after = read_quantity(skip, "s")
+    spread = 0.0 if encoders is None else read_quantity(encoders, "rad")
     subject = read_subject(robot, contacts, package_dirs)
     log = read_shown(file, map_file, subject)
     with progress_bar(None, "identifying", "row") as advance:
@@ -75,7 +76,7 @@ def identify(
             inertia=not at_rest,
             skip=after,
             postures=postures,
-            encoders=0.0 if encoders is None else read_quantity(encoders, "rad"),
+            encoders=spread,
             progress=advance,
         )
     if as_json:

@@ -103,6 +103,7 @@ def log(
 
         check_report_folder(report, overwrite=force)
     after = read_quantity(skip, "s")
+    spread = 0.0 if encoders is None else read_quantity(encoders, "rad")
     hertz = None if rate is None else read_quantity(rate, "Hz")
     chosen = read_criteria(criteria, characteristic_length)
     subject = read_subject(robot, contacts, package_dirs)
@@ -121,7 +122,7 @@ def log(
             base=base,  # type: ignore[arg-type]
             skip=after,
             postures=postures,
-            encoders=0.0 if encoders is None else read_quantity(encoders, "rad"),
+            encoders=spread,
             advance=advance,
         )
     if picture is not None:

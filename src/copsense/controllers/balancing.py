@@ -55,6 +55,9 @@ class BalancingController:
         criterion: how the load is shared among the contacts.
         gains: stiffness and damping.
         limits: what the contact wrenches and torques must respect, or None for no limits.
+        feedforward: whether it knows the reference's posture acceleration too: the momentum rate
+            then has the reference's angular part, and the postural torques M_s times it. Without,
+            as in the paper, a fast sway shares its load a little differently from its criterion.
         share: shares the load instead of `ShareByCriterion` or `ShareWithinLimits`.
         name: how it is called in results; default the criterion's name.
     """
@@ -71,6 +74,7 @@ class BalancingController:
         gains: Gains = STIFF,
         *,
         limits: Limits | None = None,
+        feedforward: bool = False,
         share: ShareLoad | None = None,
         name: str | None = None,
     ) -> None:
@@ -88,6 +92,7 @@ class BalancingController:
         self.criterion = criterion
         self.gains = gains
         self.limits = limits
+        self.feedforward = bool(feedforward)
         self.name: str = name or criterion.name
         driven = bool(stance.robot.drives or stance.loads)
         self._dynamics = (DrivenDynamics if driven else StandingDynamics)(stance)
@@ -98,6 +103,7 @@ class BalancingController:
         self._share = share or ShareByCriterion(stance, criterion)
         self._gravity = np.array(stance.robot.model.gravity.linear)
         self._com_gains = np.array(gains.com_stiffness), np.array(gains.com_damping)
+        self._none = np.zeros(len(self._dynamics.M))
         M, kp, kd = self._dynamics.M, *gains.per_joint(stance.robot)
         self._redundant = 0  # rows of J_s that depend on others at the stance
         self._driven: DrivenTorques | None = None
@@ -119,10 +125,9 @@ class BalancingController:
         self._wrenches = (len(stance.contacts), 6)
         upright = self._dynamics.base_wrench(-self._dynamics.mass * self._gravity, np.zeros(3))
         if self._driven is None:
-            self._compute(upright, np.zeros(len(kp)))
+            self._compute(upright, np.zeros(len(kp)), self._none[6:])
         else:
-            still = np.zeros(len(M))
-            self._driven.compute(self._share, upright, np.zeros(len(kp)), still)
+            self._driven.compute(self._share, upright, np.zeros(len(kp)), self._none, self._none)
 
     def __call__(self, observation: Observation) -> Command:
         """The torques at a state, and the contact wrenches they are to cause."""
@@ -140,25 +145,35 @@ class BalancingController:
         )
         # The reference's own angular momentum is not braked: the posture would lag behind it.
         spin = gains.momentum_damping * faster + gains.momentum_stiffness * away
-        wrench = dyn.base_wrench(
-            dyn.mass * (acceleration - self._gravity), -dyn.angular_map.dot(spin)
-        )
+        moment = -dyn.angular_map.dot(spin)
+        ahead = target.acceleration if self.feedforward else self._none
+        if self.feedforward:  # M_b a + h_b has the angular momentum rate of the reference
+            moment = moment + dyn.moment(dyn.M[:6].dot(ahead) + dyn.h[:6])
+        wrench = dyn.base_wrench(dyn.mass * (acceleration - self._gravity), moment)
         stiffness, damping = self._posture_gains
         driven = self._driven
         if driven is None:
-            torques, forces = self._compute(wrench, stiffness * away[6:] + damping * faster[6:])
+            torques, forces = self._compute(
+                wrench, stiffness * away[6:] + damping * faster[6:], ahead[6:]
+            )
         else:
             posture = stiffness * driven.speeds(away) + damping * driven.speeds(faster)
-            torques, forces = driven.compute(self._share, wrench, posture, faster)
+            torques, forces = driven.compute(self._share, wrench, posture, faster, ahead)
             forces = forces[: len(self._slots)]
         wrenches = np.zeros(self._wrenches)
         wrenches.put(self._slots, forces)
         return Command(torques, wrenches)
 
     def _compute(
-        self, base_wrench: Float[np.ndarray, " 6"], posture: Float[np.ndarray, " n"]
+        self,
+        base_wrench: Float[np.ndarray, " 6"],
+        posture: Float[np.ndarray, " n"],
+        ahead: Float[np.ndarray, " n"],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Torques and stacked contact forces for a wrench on the base and postural torques."""
+        """Torques and stacked contact forces for a wrench on the base and postural torques.
+
+        `ahead` are accelerations of the joints that are known before: M_s times them is added.
+        """
         M, h, J, bias = self._dynamics.M, self._dynamics.h, self._dynamics.J, self._dynamics.bias
         m, nv = J.shape
         L = lapack.dpotrf(M, lower=1)[0]
@@ -169,13 +184,14 @@ class BalancingController:
         right[:6, m + 1] = base_wrench - h[:6]
         right[6:, m + 2] = posture
         solved = lapack.dtrtrs(L, right, lower=1, overwrite_b=1)[0]
+        Ls = L[6:, 6:]
         Y, k, p = solved[6:, :m], solved[6:, m], solved[6:, m + 2]
+        p += Ls.T.dot(ahead)  # L_s^-1 M_s a
         # J_b w + J_s M_s^-1 posture: the base's share of one column and the joints' of another.
         free = solved[:, m + 2]
         free[:6] = solved[:6, m + 1]
         # Matrices this small are multiplied with `dot`: it takes half the time of `@`.
         mu = self._reactions(Y.T.dot(Y), -bias - solved[:, :m].T.dot(free))
-        Ls = L[6:, 6:]
         offset = Ls.dot(k + p + Y.dot(mu))
         joint_map = Ls.dot(Y)
         problem = LoadProblem(J[:, :6].T, base_wrench, joint_map, offset, M[6:, 6:])

@@ -69,6 +69,7 @@ class DrivenTorques:
         base_wrench: Float[np.ndarray, " 6"],
         posture: Float[np.ndarray, " k"],
         beyond: Float[np.ndarray, " nv"],
+        ahead: Float[np.ndarray, " nv"],
     ) -> tuple[np.ndarray, np.ndarray]:
         """Motor torques (k,) and stacked forces x (c,).
 
@@ -78,6 +79,7 @@ class DrivenTorques:
             posture: torques of the motors that keep the posture.
             beyond: velocity beyond the reference's (nv,), of which motions that no motor holds are
                 damped.
+            ahead: the reference's acceleration (nv,), or zeros.
         """
         dyn, robot, nb = self._dynamics, self._robot, self._nb
         M, C, known = dyn.M, dyn.C, dyn.h + dyn.load
@@ -94,6 +96,7 @@ class DrivenTorques:
             right[:, -1] = -_CALM * u.dot(u.T.dot(Mu).dot(u.T.dot(beyond)))
         right[:6, -2] = base_wrench - dyn.h[:6]
         right[6:, -1] += robot.joint_torques(posture)
+        right[:, -1] += M.dot(ahead)
         solved = lapack.dtrtrs(L, right, lower=1, overwrite_b=1)[0]
         least, Z = _equations(solved[:, :-2], demand)
         # What is left of the momentum's rows, z_b = the wanted ones, then the posture.

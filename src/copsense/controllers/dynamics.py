@@ -87,3 +87,8 @@ class StandingDynamics:
         """A wrench about the centre of mass, world axes, as one on the base in its own axes."""
         self._at_com.translation = self.com
         return self._base.actInv(self._at_com.act(pin.Force(force, moment))).vector
+
+    def moment(self, base_wrench: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 3"]:
+        """The moment about the centre of mass, world axes, of a wrench on the base."""
+        self._at_com.translation = self.com
+        return self._at_com.actInv(self._base.act(pin.Force(base_wrench))).angular

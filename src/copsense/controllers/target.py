@@ -40,6 +40,7 @@ class Target(ShortRepr):
         com_acceleration: its acceleration (3,) [m/s^2].
         posture: configuration (nq,).
         velocity: its velocity (nv,).
+        acceleration: derivative of `velocity` (nv,).
     """
 
     com: Float[np.ndarray, " 3"]
@@ -47,6 +48,7 @@ class Target(ShortRepr):
     com_acceleration: Float[np.ndarray, " 3"]
     posture: Float[np.ndarray, " nq"]
     velocity: Float[np.ndarray, " nv"]
+    acceleration: Float[np.ndarray, " nv"]
 
 
 @runtime_checkable
@@ -262,7 +264,8 @@ class PathReference:
         found.setflags(write=False)
         posture = pin.integrate(self._model, self._q[i], found[0, 3:])
         posture.setflags(write=False)
-        return Target(found[0, :3], found[1, :3], found[2, :3], posture, found[1, 3:])
+        com, moved = found[:, :3], found[1:, 3:]
+        return Target(com[0], com[1], com[2], posture, moved[0], moved[1])
 
 
 def lateral_reference(stance: Stance, signal: Signal) -> PathReference:

@@ -27,6 +27,7 @@ from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
+from copsense.simulation.timed_prediction import timed_note
 from copsense.stance import Stance, check_stance
 from copsense.statics import with_tie_breaks
 
@@ -38,6 +39,7 @@ def balance(
     *,
     limits: Limits | None = None,
     gains: Gains = STIFF,
+    feedforward: bool = False,
     controller: Controller | None = None,
     until: Literal["tip", "fall"] = "fall",
     wrenches: Literal["contacts", "sensors"] = "contacts",
@@ -57,6 +59,7 @@ def balance(
             its duration, pushes, noise and the rest. Default: hold still.
         limits: what the controller's wrenches and torques must respect; None for nothing.
         gains: of the built-in controller.
+        feedforward: whether the built-in controller knows the reference's posture acceleration.
         controller: another controller than `BalancingController`.
         until: ``"tip"`` ends with the first contact that tips, lifts or slips, ``"fall"`` with a
             fall or the end of the scenario.
@@ -96,7 +99,9 @@ def balance(
         (predicted,) = tied.values()
     if controller is None:
         assert predicted is not None
-        controller = BalancingController(stance, predicted, gains, limits=limits)
+        controller = BalancingController(
+            stance, predicted, gains, limits=limits, feedforward=feedforward
+        )
     ground = scenario.friction_at_start(stance, simulator.settings.friction)
     prediction = None if predicted is None else predict(path, predicted, limits, ground)
     recording = rollout(
@@ -109,7 +114,10 @@ def balance(
     )
     if prediction is not None and prediction.at_rest:
         notes = (*notes, prediction.at_rest)
-    recording = recording.with_notes((*notes, *closure_notes(stance), *hanging_notes(stance)))
+    timed = () if prediction is None else filter(None, (timed_note(path),))
+    recording = recording.with_notes(
+        (*notes, *timed, *closure_notes(stance), *hanging_notes(stance))
+    )
     return recording if prediction is None else prediction.attach(recording)
 
 

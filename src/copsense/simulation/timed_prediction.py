@@ -61,6 +61,19 @@ def predict_in_motion(
     return TimedPrediction(abs(signal.amplitude), signal.frequency, cops, loads)
 
 
+def timed_note(reference: PathReference) -> str:
+    """Why a moving reference has no prediction in motion; empty where it has one, or stands."""
+    signal = reference.signal
+    low, high = signal.extent
+    if low == high or (isinstance(signal, Sine) and reference.path.continuous):
+        return ""
+    what = "a list of configurations" if isinstance(signal, Sine) else f"a {type(signal).__name__}"
+    return (
+        f"{what} has no prediction in motion, which is of a Sine along a continuous path: the "
+        "prediction is static. copsense.timed_path.TimedPath gives single instants."
+    )
+
+
 def cops_or_nan(equilibrium: StaticEquilibrium) -> Float[np.ndarray, "nc 2"]:
     """Centre of pressure of each contact [m]; NaN where it carries no load."""
     w, unloaded = equilibrium.wrenches, equilibrium.unloaded
