@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
 from copsense.explore import Model, Setting, State
+from copsense.explore.playback import Playback
 from copsense.explore.shape import JointMesh
 from copsense.identification import Measurements, identify
 from copsense.labelled import LabelledResult
@@ -206,6 +208,9 @@ def all_results(icub) -> dict[str, object]:
             np.zeros((1, 2, 40)),
         ),
         "state": State(("icub",), {"com_y": Setting(0.01, "m")}, limits=LIMITS),
+        "playback": Playback(
+            Path("run.nc"), "time", "s", bar.q[:2], bar.q[None], np.arange(2), None
+        ),
         "mesh": JointMesh(1, np.zeros((3, 3)), np.arange(3)[None]),
         "view": explored.add_regions(shown),
         "case": make_plan(

@@ -28,6 +28,7 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
     "--save-stance": 1,
     "--force-stance": 0,
     "--export": 1,
+    "--recording": 1,
     "--force": 0,
     "--port": 1,
     "--host": 1,
@@ -44,7 +45,8 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
     "  copsense explore icub\n"
     "  copsense explore my.urdf --contact l_foot --contact r_foot --contact-at sole\n"
     "  copsense explore talos --com-y 30mm --limits friction=0.5,torque=model\n"
-    "  copsense explore icub --com-y 30mm --export icub.html"
+    "  copsense explore icub --com-y 30mm --export icub.html\n"
+    "  copsense explore icub --recording run.nc"
 )
 @stance_options
 @criterion_options
@@ -73,6 +75,12 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
     help="Put the robot's meshes into the page of --export, with who made them: giving the page on "
     "gives them on.",
 )
+@click.option(
+    "--recording",
+    type=click.Path(dir_okay=False),
+    help="Play a file of copsense balance or copsense sweep (.nc) instead of moving the robot, its "
+    "measured centres of pressure beside the criteria's; with --export as a film in the page.",
+)
 @click.option("--force", is_flag=True, help="Overwrite the page.")
 @click.option("--json", "as_json", is_flag=True, help="Print the address as JSON.")
 def explore(
@@ -87,6 +95,7 @@ def explore(
     light: bool,
     export: str | None,
     meshes: bool,
+    recording: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -115,12 +124,21 @@ def explore(
     kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
     stance = read_stance(robot, **options)
     file = remembered_stance()
-    model = Model(
-        stance,
-        stance_words(sys.argv[1:]),
-        criteria=file.criteria or None if file else None,
-        limits=file.limits if file else None,
-    )
+    words = stance_words(sys.argv[1:])
+    criteria_of_file = file.criteria or None if file else None
+    limits_of_file = file.limits if file else None
+    if recording is None:
+        model = Model(stance, words, criteria=criteria_of_file, limits=limits_of_file)
+    else:
+        from copsense.explore.playback import Playback, PlayedModel
+
+        if joints or at or any(value is not None for value in asked.values()):
+            raise InvalidInputError(
+                "--recording says where the robot is, and so do --com-x, --com-y, --com-z, --joint "
+                "and --at. Give one of them."
+            )
+        played = Playback.load(recording, stance)
+        model = PlayedModel(stance, played, words, criteria=criteria_of_file, limits=limits_of_file)
     coordinates = {n: Setting(v, "m") for n, v in asked.items() if v is not None}
     for name, value in read_positions(joints, stance.robot).items():
         coordinates[name] = Setting(value, stance.robot.joint_unit(name))

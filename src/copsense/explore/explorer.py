@@ -15,12 +15,14 @@ from copsense.errors import CopsenseError
 from copsense.explore.drawing import Scene, look_at, place_camera
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
+from copsense.explore.playback import PlayedModel
 from copsense.explore.server import LOOPBACK, GuardedServer
 from copsense.explore.shape import Shape, load_shape
 from copsense.explore.state import State
 from copsense.explore.view import View
 from copsense.explore.worker import Worker
 
+_RATE = 25.0  # frames a second of a playback
 _FOLLOW, _ENDS = 0.3, 1.0  # s of rest before sliders follow the posture, and their ends the state
 
 
@@ -97,6 +99,7 @@ class Explorer:
                 "front": self._from_front,
                 "save stance": self._save,
             },
+            playback=model.playback if isinstance(model, PlayedModel) else None,
         )
         self._scene = Scene(viser, first, self._shape, light=light)
         self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
@@ -106,6 +109,9 @@ class Explorer:
         self._limited = threadpool_limits(1)  # small matrices: more threads only cost
         self._worker.start()
         self._worker.submit(state)
+        self._closing = threading.Event()
+        if isinstance(model, PlayedModel):
+            threading.Thread(target=self._play, daemon=True).start()
 
     @property
     def url(self) -> str:
@@ -119,6 +125,7 @@ class Explorer:
 
     def close(self) -> None:
         """Stop working, then listening."""
+        self._closing.set()
         self._worker.stop()
         self.server.stop()
         self._limited.unregister()
@@ -135,6 +142,8 @@ class Explorer:
         # Callbacks run in many threads: whoever reads last, reads the newest.
         with self._lock:
             state = self._panel.read()
+            if isinstance(self.model, PlayedModel):
+                self.model.row = self._panel.row
             if state.held and not self.model.compiled and self._compiling is None:
                 self._compiling = threading.Thread(target=self._compile, daemon=True)
                 self._compiling.start()
@@ -147,10 +156,14 @@ class Explorer:
         )
         with viser.atomic():
             self._scene.show(view, self._panel.shown())
+            if isinstance(self.model, PlayedModel) and view.row is not None:
+                self._scene.show_reference(self.model.measured(view.row))
             self._panel.write(view, status, self._saved)
         viser.flush()
 
     def _stages(self) -> tuple[tuple[float, Callable[[View, Stale], View]], ...]:
+        if isinstance(self.model, PlayedModel):
+            return self.model.stages
         own = ((_FOLLOW, self._follow), (_ENDS, self._find_ends))
         return tuple(sorted((*self.model.stages, *own), key=lambda stage: stage[0]))
 
@@ -170,6 +183,16 @@ class Explorer:
                     return view
                 self._panel.set_ends(name, low, high)
         return view
+
+    def _play(self) -> None:
+        """Go on in time while it is played; a frame that is not ready is left out."""
+        before = time.monotonic()
+        while not self._closing.wait(1 / _RATE):
+            now = time.monotonic()
+            if self._worker.idle:
+                if self._panel.advance(now - before):
+                    self._changed()
+                before = now
 
     def _compile(self) -> None:
         self._status = (

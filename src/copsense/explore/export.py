@@ -5,10 +5,13 @@ from __future__ import annotations
 import html
 from pathlib import Path
 
+import numpy as np
+
 from copsense._version import __version__
 from copsense.errors import InvalidInputError
 from copsense.explore.drawing import OPACITY, Scene, Shown, criterion_colours, place_camera
 from copsense.explore.model import Model
+from copsense.explore.playback import PlayedModel, frame_rows
 from copsense.explore.server import GuardedServer
 from copsense.explore.shape import Shape, load_shape
 from copsense.explore.state import State
@@ -41,12 +44,15 @@ def page_of(model: Model, state: State, *, meshes: bool = False) -> str:
         InvalidInputError: the state has no posture.
         MissingExtraError: viser is not installed.
     """
+    if isinstance(model, PlayedModel):
+        model.row = 0
     view = model.view(state)
     if view.reason:
         raise InvalidInputError(view.reason)
     view = model.add_regions(view)
+    films = _frames(model, state, view)
     shape = load_shape(model.stance.robot) if meshes else Shape()
-    scene = _scene_html(view, shape)
+    scene = _scene_html(view, shape, films)
     return _page(model, view, scene, shape.licences)
 
 
@@ -65,15 +71,36 @@ def export_page(
     return target
 
 
-def _scene_html(view: View, shape: Shape) -> str:
-    """The scene as a page of viser's own client."""
+Frame = tuple[View, np.ndarray | None]  # and what was measured
+
+
+def _frames(model: Model, state: State, view: View) -> tuple[list[Frame], float]:
+    """The views of a playback, and the seconds between them; of another model its one view."""
+    if not isinstance(model, PlayedModel):
+        return [(view, None)], 0.0
+    rows, seconds = frame_rows(model.playback)
+    found = []
+    for row in rows:
+        model.row = row
+        found.append((model.view(state), model.measured(row)))
+    return found, seconds
+
+
+def _scene_html(view: View, shape: Shape, frames: tuple[list[Frame], float]) -> str:
+    """The scene as a page of viser's own client, with a bar to play where there are frames."""
     server = GuardedServer()
     try:
         scene = Scene(server.viser, view, shape, light=True)
         names = [each.name for each in view.criteria]
-        scene.show(view, Shown(torques=names[-1] if names else "", opacity=OPACITY))
+        shown = Shown(torques=names[-1] if names else "", opacity=OPACITY)
+        scene.show(view, shown)
         place_camera(server.viser, view)
-        return str(server.viser.get_scene_serializer().as_html())
+        recording = server.viser.get_scene_serializer()
+        for each, measured in frames[0] if len(frames[0]) > 1 else []:
+            scene.show(each, shown)
+            scene.show_reference(measured)
+            recording.insert_sleep(frames[1])
+        return str(recording.as_html())
     finally:
         server.stop()
 
@@ -93,6 +120,8 @@ def _page(model: Model, view: View, scene: str, licences: tuple[str, ...]) -> st
     heads = ("criterion", "contact", "load", "CoP x, y [mm]", "margin [mm]", "CoM travel [mm]")
     table = "".join(f"<th>{head}</th>" for head in heads)
     rows = "".join(row(each) for each in view.rows)
+    if isinstance(model, PlayedModel):
+        rows += '<tr><td colspan="6">(of the first posture that is played)</td></tr>'
     notes = "".join(f"<li>{text(note)}</li>" for note in view.notes)
     made = "".join(f"<p>{text(each)}</p>" for each in licences)
     name = text(model.stance.robot.name)
@@ -104,7 +133,7 @@ def _page(model: Model, view: View, scene: str, licences: tuple[str, ...]) -> st
         f"<h1>{name}</h1><p>{text(view.verdict)}.</p>"
         f'<iframe sandbox="allow-scripts" title="{name} in 3-D" srcdoc="{frame}"></iframe>'
         f'<div class="wide"><table><tr>{table}</tr>{rows}</table></div>'
-        f"<ul>{notes}</ul><p><code>{text(view.state.to_command())}</code></p>"
+        f"<ul>{notes}</ul><p><code>{text(model.code(view.state)[0])}</code></p>"
         f"<footer>{made}<p>Made by copsense {__version__}; the 3-D view is by viser "
         "(MIT licence).</p></footer></body></html>\n"
     )

@@ -222,7 +222,7 @@ class Model:
             for y, here in self._lateral(key):
                 if stale():
                     return view
-                found[y] = [_least_margin(here, c, limits) for c in names.values()]
+                found[y] = [least_margin(here, c, limits) for c in names.values()]
             if not found:
                 return view
             ys = np.array(sorted(found))
@@ -297,6 +297,14 @@ class Model:
                 )
         return replace(view, binding=tuple(lines))
 
+    def code(self, state: State) -> tuple[str, str]:
+        """The command and the lines of Python that print a state's numbers.
+
+        Raises:
+            InvalidInputError: as `State.to_command`.
+        """
+        return state.to_command(), state.to_python()
+
     def values(self, view: View) -> dict[str, float]:
         """Where a view's posture has each CoM and joint coordinate [m, rad]."""
         robot = self.stance.robot
@@ -358,7 +366,7 @@ class Model:
         return dict(named_criteria(found, "an explorer", policies=False))
 
 
-def _least_margin(stance: Stance, criterion: Criterion, limits: Limits | None) -> float:
+def least_margin(stance: Stance, criterion: Criterion, limits: Limits | None) -> float:
     """The least margin of any contact with a sole [m]; NaN where there is none."""
     try:
         chosen, _ = determined_criteria(stance, {criterion.name: criterion}, limits)

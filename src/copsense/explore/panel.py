@@ -14,6 +14,7 @@ from copsense.criterion import CRITERIA
 from copsense.errors import InvalidInputError
 from copsense.explore.drawing import OPACITY, Colour, Shown, criterion_colours, effort_colour
 from copsense.explore.model import Coordinate, Model
+from copsense.explore.playback import SWEEP_SECONDS, Playback
 from copsense.explore.state import Setting, State, weights_text
 from copsense.explore.view import View
 from copsense.limits import Limits
@@ -47,6 +48,7 @@ class Panel:
         meshes: bool,
         changed: Callable[[], object],
         actions: Mapping[str, Callable[[], object]],
+        playback: Playback | None = None,
     ) -> None:
         """Lay out the controls.
 
@@ -57,6 +59,7 @@ class Panel:
             meshes: whether there are any to show.
             changed: called when anything was changed.
             actions: label of a button -> what it does.
+            playback: what is played instead of moving the robot.
         """
         self._gui, self._model, self._changed = server.gui, model, changed
         self._assigning = False
@@ -70,16 +73,53 @@ class Panel:
         self._copy = gui.add_html("")
         buttons = gui.add_button_group("", tuple(actions))
         buttons.on_click(lambda event: actions[event.target.value]())
+        self._playback = playback
+        self._playing(playback)
         self._coordinates(state)
         self._judging(state)
         self._showing(meshes)
         self._more = gui.add_html("")
 
+    def _playing(self, playback: Playback | None) -> None:
+        if playback is None:
+            return
+        gui = self._gui
+        low, high = float(playback.values.min()), float(playback.values.max())
+        with gui.add_folder("Playback"):
+            self._time = gui.add_slider(
+                f"{playback.axis} [{playback.unit}]",
+                min=low,
+                max=max(high, low + 1e-6),
+                step=max((high - low) / 1000.0, 1e-6),
+                initial_value=float(playback.values[0]),
+            )
+            self._time.on_update(self._any)
+            self._play = gui.add_checkbox("play", False)
+            self._speed = gui.add_dropdown("speed", ("1", "0.5", "0.25", "0.1", "2"))
+
+    @property
+    def row(self) -> int:
+        """The row of the playback that is shown."""
+        assert self._playback is not None
+        return int(np.argmin(np.abs(self._playback.values - self._time.value)))
+
+    def advance(self, seconds: float) -> bool:
+        """Go on by so many seconds, round at the end; whether it is played at all."""
+        playback = self._playback
+        if playback is None or not self._play.value:
+            return False
+        rate = 1.0 if playback.axis == "time" else (self._time.max - self._time.min) / SWEEP_SECONDS
+        value = self._time.value + seconds * rate * float(self._speed.value)
+        with self._silently():
+            self._time.value = value if value <= self._time.max else self._time.min
+        return True
+
     def _coordinates(self, state: State) -> None:
         gui = self._gui
+        moved = self._playback is None
         self._sliders: dict[str, Any] = {}
         self._folders: dict[str, Any] = {}
-        with gui.add_folder("Posture"):
+        with gui.add_folder("Posture", visible=moved):
             self._mode = gui.add_dropdown(
                 "what gives way",
                 (NEAREST, HELD),
@@ -93,7 +133,9 @@ class Panel:
             own = [c for c in self._model.coordinates.values() if c.kind == kind]
             if not own:
                 continue
-            self._folders[kind] = gui.add_folder(label, expand_by_default=kind == "com")
+            self._folders[kind] = gui.add_folder(
+                label, expand_by_default=kind == "com", visible=moved
+            )
             with self._folders[kind]:
                 for c in own:
                     self._sliders[c.name] = self._slider(c, state)
@@ -297,7 +339,7 @@ class Panel:
         self._status.content = _status_html(view, status)
         self._table.content = _table_html(view, colours)
         self._asked.content = _asked_html(view.state, self._model)
-        self._copy.content = _copy_html(view.state, save)
+        self._copy.content = _copy_html(self._model, view.state, save)
         self._more.content = _notes_html(view)
         self._plot(view, colours)
 
@@ -306,8 +348,13 @@ class Panel:
             if self._curve is not None:
                 self._curve.visible = False
             return
-        y = view.curve_y * 1e3
-        now = float(view.com[1]) * 1e3
+        played, name, unit = self._playback, "CoM y", "m"
+        now = float(view.com[1])
+        if played is not None:
+            name, unit = played.axis, played.unit
+            now = float(played.values[view.row or 0])
+        scale, shown = (1e3, "mm") if unit == "m" else (1.0, unit)
+        y, now = view.curve_y * scale, now * scale
         rows = [row * 1e3 for row in view.curve_margin]
         low, high = _span(rows)
         low = max(low, -_DEEPEST)  # far outside nobody compares
@@ -317,10 +364,11 @@ class Panel:
             "y": {"auto": False, "range": (low - room, high + room)},
         }
         # The cursor: an upright line at the CoM's y, two points of a series of its own.
-        at = np.sort(np.append(y, [now - 1e-3, now + 1e-3]))
+        near = 1e-6 * max(float(np.ptp(y)), 1e-9)
+        at = np.sort(np.append(y, [now - near, now + near]))
         margins = [np.interp(at, y, row, left=np.nan, right=np.nan) for row in rows]
         cursor = np.full(len(at), np.nan)
-        first = int(np.searchsorted(at, now - 2e-3))
+        first = int(np.searchsorted(at, now - 1.5 * near))
         cursor[first : first + 2] = low - room, high + room
         data = (at, *margins, cursor)
         if self._curve is not None and len(self._curve.data) == len(data):
@@ -332,10 +380,10 @@ class Panel:
         if self._curve is not None:
             self._curve.remove()
         series: tuple[Any, ...] = (
-            {"label": "CoM y [mm]"},
+            {"label": f"{name} [{shown}]"},
             *(
-                {"label": name, "stroke": _css(colour), "width": 2}
-                for name, colour in list(colours.items())[: len(rows)]
+                {"label": each, "stroke": _css(colour), "width": 2}
+                for each, colour in list(colours.items())[: len(rows)]
             ),
             {"label": "now", "stroke": "#555", "width": 1.5},
         )
@@ -343,7 +391,7 @@ class Panel:
             self._curve = self._gui.add_uplot(
                 data,
                 series,
-                title="least margin [mm] over CoM y [mm]",
+                title=f"least margin [mm] over {name} [{shown}]",
                 scales=scales,
                 height=_CURVE_HEIGHT,
                 legend={"show": False},
@@ -373,7 +421,7 @@ class Panel:
 
     def _show_kinds(self, held: bool) -> None:
         for kind in ("trunk", "foot"):
-            if kind in self._folders:
+            if kind in self._folders and self._playback is None:
                 self._folders[kind].visible = held
 
     @contextmanager
@@ -491,9 +539,9 @@ def _asked_html(state: State, model: Model) -> str:
     )
 
 
-def _copy_html(state: State, save: str) -> str:
+def _copy_html(model: Model, state: State, save: str) -> str:
     try:
-        command = state.to_command()
+        command, python = model.code(state)
     except InvalidInputError as error:
         return f'<div style="padding:0 .8em;font-size:.75em">no command: {_text(error)}</div>'
     buttons = "".join(
@@ -502,7 +550,7 @@ def _copy_html(state: State, save: str) -> str:
         f'{_text(text)}" onclick="navigator.clipboard.writeText(this.dataset.text)'
         ".then(() => {const was = this.innerText; this.innerText = 'copied';"
         f'setTimeout(() => this.innerText = was, 900)}})">{label}</button>'
-        for label, text in (("copy command", command), ("copy Python", state.to_python()))
+        for label, text in (("copy command", command), ("copy Python", python))
     )
     saved = f'<div style="font-size:.75em">{_text(save)}</div>' if save else ""
     return (

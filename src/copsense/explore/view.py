@@ -108,6 +108,7 @@ class View(ShortRepr):
         regions: of the CoM; None until they are known.
         binding: what is met first on the way to either side within limits, a line each; None until
             it is known.
+        row: of a playback; None where the posture is asked for.
     """
 
     state: State
@@ -128,6 +129,7 @@ class View(ShortRepr):
     curve_margin: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
     regions: tuple[RegionView, ...] | None = None
     binding: tuple[str, ...] | None = None
+    row: int | None = None
 
     def __post_init__(self) -> None:
         """Own the arrays."""

@@ -72,6 +72,11 @@ class Worker:
             self._news.notify_all()
             return self._asked
 
+    @property
+    def idle(self) -> bool:
+        """Whether the latest state has its view."""
+        return self._asked == self._answered
+
     def again(self) -> None:
         """Answer the latest state once more, as when the model has changed."""
         with self._news:
