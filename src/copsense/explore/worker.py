@@ -96,7 +96,7 @@ class Worker:
         """Do what is due: a view, or a stage of it.
 
         Returns:
-            Seconds until more is due: 0 for at once, None until there is news.
+            Seconds until more is due, 0 for at once; None until there is news.
         """
         with self._news:
             state, number, since = self._latest, self._asked, self._since
