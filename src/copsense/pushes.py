@@ -12,6 +12,7 @@ leans or moves its arms can be pushed is another question.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -177,11 +178,16 @@ class Pushes(ShortRepr):
         for region in self.regions:
             along = [region.largest(u) for u in ((1, 0), (-1, 0), (0, 1), (0, -1))]
             force, angle, gives_way = region.weakest
-            told = f"{np.degrees(angle):+5.0f} deg" if region.stands else "does not stand"
+            told = f"{_degrees(angle):+5d} deg" if region.stands else "does not stand"
             told += f": {gives_way}" if gives_way else ""
             numbers = " ".join(f"{value:7.1f}" for value in along)
             lines.append(f"{region.name:26} {numbers} {force:9.1f}  {told}")
         return "\n".join(lines)
+
+
+def _degrees(angle: float) -> int:
+    """A direction in whole degrees, each by one name: neither -0 nor -180."""
+    return 180 - (180 - round(math.degrees(angle))) % 360
 
 
 def push_limits(

@@ -63,7 +63,9 @@ def test_other_parameters_are_one_line_with_what_differs(made):
     over = ("--over", "roll=-4:4", "--over", "com_y=-50mm:0.05")
     other = run("map", "icub", *over, "--samples", 7, "--output", folder / "m.zarr").error
     assert "it is over com_y=-0.05:0.05" in other
-    assert "asked for is roll=-0.06981317008:0.06981317008, com_y=-0.05:0.05, 7 sobol samples" in other
+    assert (
+        "asked for is roll=-0.06981317008:0.06981317008, com_y=-0.05:0.05, 7 sobol samples" in other
+    )
     heavy = run(*COMMAND, "--output", folder / "m.zarr", "--load", "l_hand=0:0:-1").error
     assert "the robot's model, its drives or its loads are others. It was not touched" in heavy
 

@@ -8,6 +8,10 @@ import pytest
 import xarray as xr
 from support.commands import copsense
 
+from copsense.analysis.joint_notes import distance_text
+from copsense.cli.sweep_command import _print
+from copsense.pushes import _degrees
+
 LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 
 
@@ -120,3 +124,39 @@ def test_the_com_is_swept_forwards_and_upwards_too(axis, tmp_path):
         np.testing.assert_allclose(data["com"].sel(com_axis=axis), wanted, rtol=0, atol=1e-12)
     both = copsense("sweep", "icub", "--com-x", "0:1:2", "--com-z", "0:1:2")
     assert "--com-x, --com-y or --com-z" in both.error
+
+
+@pytest.mark.parametrize(
+    ("limits", "soleless", "failed", "said"),
+    [
+        ("Limits()", (), 0, "a limit active at every posture"),
+        ("Limits()", (), 1, "a limit active at every posture that was evaluated"),
+        (None, (), 0, "a contact beyond its sole at every posture"),
+        (None, ("l_foot",), 0, "a contact that pulls at every posture"),
+        (None, (), 3, "no posture was evaluated"),
+    ],
+)
+def test_what_is_so_at_no_posture_is_said_the_other_way_round(
+    limits, soleless, failed, said, capsys
+):
+    row = {"planted": None, "smallest_margin": None, "static_frequency": None}
+    _print(
+        {
+            "robot": "r", "postures": 3, "coordinate": "com_y", "unit": "m", "period": None,
+            "criteria": {"c": row}, "limits": limits, "without_sole": soleless,
+            "failed_rows": failed,
+        }
+    )  # fmt: skip
+    assert capsys.readouterr().out.splitlines()[1] == f"  c: {said}"
+
+
+def test_small_distances_and_directions_have_one_name():
+    assert distance_text(1e-6, "rad") == "6e-05 deg"
+    assert distance_text(0.02, "m") == "20.0 mm"
+    assert [_degrees(math.radians(d)) for d in (-180, -179.6, -0.3, 0, -90)] == [
+        180,
+        180,
+        0,
+        0,
+        -90,
+    ]

@@ -56,11 +56,11 @@ def test_a_tip_is_told_beside_the_prediction():
 def test_a_motion_too_fast_for_statics_is_said_to_be_and_how_far_they_looked():
     run = ("balance", "solo12", "--reference", "sine:0.005:2", "--duration", 0.05)
     said = copsense(*run).out
-    assert "static prediction: none up to 5.0 mm" in said
+    assert "static prediction: no contact tips up to 5.0 mm" in said
     assert "too fast for statics" in said
     summary = copsense(*run, "--json").json
     assert summary["static_prediction"]["excursion"] is None
-    assert summary["static_prediction"]["statement"] == "none up to 5.0 mm"
+    assert summary["static_prediction"]["statement"] == "no contact tips up to 5.0 mm"
     assert summary["static_prediction"]["reach"] == pytest.approx(0.005)
     fast = summary["quasi_static"]
     # w^2 lever / g of the sine.

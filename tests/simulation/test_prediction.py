@@ -52,7 +52,7 @@ def test_where_the_reference_ends_first_it_says_how_far_it_looked(icub):
     found = predict(lateral_reference(icub, Sine(0.03, 0.5)), C2)
     assert found.excursion == np.inf
     assert (found.contact, found.how) == ("", "")
-    assert found.statement == "none up to 30.0 mm"
+    assert found.statement == "no contact tips up to 30.0 mm"
 
 
 def test_what_limits_hold_on_the_edge_tips_there(icub):

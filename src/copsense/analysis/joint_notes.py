@@ -23,6 +23,6 @@ def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
 
 def distance_text(value: float, unit: str) -> str:
     """A distance of a joint, ``"rad"`` or ``"m"``, as people read it: degrees or millimetres."""
-    if unit == "rad":
-        return f"{math.degrees(value):.1f} deg"
-    return f"{value * 1e3:.1f} mm"
+    shown, name = (math.degrees(value), "deg") if unit == "rad" else (value * 1e3, "mm")
+    # What rounds to nothing is not nothing.
+    return f"{shown:.1f} {name}" if abs(shown) >= 0.05 or not shown else f"{shown:.1g} {name}"

@@ -151,6 +151,21 @@ def _rounded(value: float) -> float:
     return round(value, 1) + 0.0  # no minus before a zero
 
 
+_OPPOSITE = {
+    "no limit active": "a limit active",
+    "every contact planted": "a contact beyond its sole",
+    "every contact pushes": "a contact that pulls",
+}
+
+
+def _nowhere(word: str, summary: dict[str, Any]) -> str:
+    """What to say where something is so at no posture."""
+    failed = summary["failed_rows"]
+    if failed == summary["postures"] * len(summary["criteria"]):
+        return "no posture was evaluated"
+    return f"{_OPPOSITE[word]} at every posture" + (" that was evaluated" if failed else "")
+
+
 def _print(summary: dict[str, Any]) -> None:
     unit, factor = summary["unit"], 1.0
     if unit == "rad":
@@ -161,7 +176,7 @@ def _print(summary: dict[str, Any]) -> None:
         if summary["without_sole"] and not summary["limits"]:
             word = "every contact pushes"
         if row["planted"] is None:
-            planted = f"{word} at no posture"
+            planted = _nowhere(word, summary)
         else:
             low, high = (value * factor for value in row["planted"])
             planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"

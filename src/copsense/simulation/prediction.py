@@ -95,7 +95,7 @@ class StaticPrediction(ShortRepr):
     def statement(self) -> str:
         """What is predicted, in words; also where the path ends before anything happens."""
         if not np.isfinite(self.excursion):
-            return f"none up to {self.reach * 1e3:.1f} mm"
+            return f"no contact tips up to {self.reach * 1e3:.1f} mm"
         return f"{self.contact} {self.how} at {self.excursion * 1e3:.1f} mm"
 
     def smallest_margin(self, low: float, high: float) -> tuple[float, float]:
