@@ -5,8 +5,9 @@
 
 Each robot of `ROBOTS` goes through `copsense inspect` and then, with the options of the line that
 it printed and nothing else but what the command itself asks for (`COMMANDS`), through `analyse`,
-`sweep`, `balance`, `design`, `map` and `push`, each in a process of its own, once. Writes a
-Markdown table; exits with 1 if a command failed.
+`sweep`, `balance`, `design`, `map` and `push`, each in a process of its own, once. Where inspect
+noted that the contacts hold the CoM sideways, what is moved is its x (`HELD`). Writes a Markdown
+table, unless --only chose some of the robots; exits with 1 if a command failed.
 """
 
 import argparse
@@ -46,6 +47,11 @@ COMMANDS = {
     "map": "--over com_y=-10mm:10mm:5 --output {folder}/map.zarr",
     "push": "",
 }
+HELD = {
+    "sweep": "--com-x=-2mm:2mm:5",
+    "balance": "--reference hold",
+    "map": "--over com_x=-2mm:2mm:5 --output {folder}/map.zarr",
+}
 SECONDS = 300
 
 
@@ -83,9 +89,10 @@ def tried(file):
     if not found["analyse"]:
         return {"inspect": (False, found["reason"], 0.0)}
     options = shlex.split(found["analyse"])[2:]
+    held = any("hold the CoM's y fast" in note for note in found["notes"])
     answers = {}
     with tempfile.TemporaryDirectory() as folder:
-        for command, text in COMMANDS.items():
+        for command, text in (COMMANDS | (HELD if held else {})).items():
             words = shlex.split(text.format(folder=folder))
             code, out, err, seconds = run([command, *options, *words])
             said = (err or out).strip()
@@ -120,6 +127,8 @@ def main():
         f"each command once; {failed} answers are an error.",
         "",
         *(f"- `{command}` {text and f'`{text}`'}" for command, text in COMMANDS.items()),
+        "- where the contacts hold the CoM sideways, as inspect notes: "
+        + ", ".join(f"`{command} {text}`" for command, text in HELD.items()),
         "",
         "| package | file | " + " | ".join(COMMANDS) + " |",
         "|---" * (2 + len(COMMANDS)) + "|",

@@ -59,6 +59,7 @@ _FOLDED = 1e-2  # the same where the contacts hold motions to second order only
 _APART = 1e-3  # from here on the CoM's two directions are far from depending on each other
 # How far a contact may lie from its stated plane.
 POSITION_TOLERANCE = 1e-6  # m
+AT_LIMIT = 1e-6  # rad or m: a joint this far beyond its limit is at it
 ANGLE_TOLERANCE = 1e-6  # rad
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-from copsense.stance import Stance
-
-ROUNDING = 1e-6  # rad or m: a joint this far beyond its limit is at it
+from copsense.stance import AT_LIMIT, Stance
 
 
 def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
@@ -17,7 +15,7 @@ def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
         for joint, unit, excess in zip(
             robot.dof_names, robot.dof_units, stance.joint_limit_excess.tolist(), strict=True
         )
-        if excess > ROUNDING
+        if excess > AT_LIMIT
     )
 
 

@@ -134,11 +134,12 @@ def _note_joints(swept: Sweep, robot: Robot) -> None:
     """Say which joints are beyond their limits on the way."""
     import numpy as np
 
-    from copsense.analysis.joint_notes import ROUNDING, distance_text
+    from copsense.analysis.joint_notes import distance_text
+    from copsense.stance import AT_LIMIT
 
     every = swept["joint_limit_excess"].values
     for name, unit, excess in zip(robot.dof_names, robot.dof_units, every.T, strict=True):
-        count, most = int((excess > ROUNDING).sum()), float(np.nanmax(excess, initial=0.0))
+        count, most = int((excess > AT_LIMIT).sum()), float(np.nanmax(excess, initial=0.0))
         if count:
             click.echo(
                 f"note: {name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up "

@@ -11,7 +11,6 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.analysis.asked import asked_posture, determined_criteria, placed_stance
-from copsense.analysis.joint_notes import ROUNDING
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
 from copsense.batch import PostureChart, coordinate_names
@@ -35,7 +34,7 @@ from copsense.path import COM_COORDINATES, LateralPath
 from copsense.posture import solve_posture
 from copsense.regions import com_regions
 from copsense.sensitivity import cop_sensitivity
-from copsense.stance import Stance, check_at_rest, check_stance
+from copsense.stance import AT_LIMIT, Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, solve_equilibrium
 
 _CURVE_STEP, _CURVE_REACH = 0.005, 0.12  # m, between the postures of the curve and to either side
@@ -349,7 +348,7 @@ class Model:
         except CopsenseError:
             return False
         # What the stance itself is beyond, it may stay beyond.
-        return bool(np.all(here.joint_limit_excess <= self.stance.joint_limit_excess + ROUNDING))
+        return bool(np.all(here.joint_limit_excess <= self.stance.joint_limit_excess + AT_LIMIT))
 
     def _chart(self, names: tuple[str, ...]) -> PostureChart:
         key = names, self.compiled

@@ -199,15 +199,18 @@ def test_what_cannot_be_is_a_row_with_its_reason(case):
     stance = case("icub")
     chart = PostureChart(stance, ["base_z", "l_elbow"])
     z, elbow = chart.values
-    batch = chart.solve([[z, elbow], [z + 0.5, elbow], [z, 9.0], [z - 0.01, elbow], [1e9, 1e9]])
-    assert list(batch.converged) == [True, False, False, True, False]
-    assert repr(batch) == "PostureBatch(2 postures of 5 rows)"
-    assert [bool(r) for r in batch.reasons] == [False, True, True, False, True]
-    assert "unreachable" in batch.reasons[1]
-    assert "_sole along z" in batch.reasons[1]
     limit = stance.robot.model.upperPositionLimit[
         stance.robot.model.joints[stance.robot.joint_id("l_elbow")].idx_q
     ]
+    rows = [[z, elbow], [z + 0.5, elbow], [z, 9.0], [z - 0.01, elbow], [1e9, 1e9]]
+    # As the notes of an analysis say: a micrometre or microradian beyond its limit is at it.
+    rows += [[z, limit + 5e-7], [z, limit + 5e-6]]
+    batch = chart.solve(rows)
+    assert list(batch.converged) == [True, False, False, True, False, True, False]
+    assert repr(batch) == "PostureBatch(3 postures of 7 rows)"
+    assert [bool(r) for r in batch.reasons] == [False, True, True, False, True, False, True]
+    assert "unreachable" in batch.reasons[1]
+    assert "_sole along z" in batch.reasons[1]
     assert batch.reasons[2] == f"joint l_elbow over its limit by {9.0 - limit:.3g} rad"
     assert np.isnan(batch.configurations[[1, 2, 4]]).all()
     assert np.isfinite(batch.configurations[[0, 3]]).all()

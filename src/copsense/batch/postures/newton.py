@@ -32,7 +32,6 @@ from copsense.batch.postures.search_settings import (
     MOST_STEPS,
     PATIENCE,
     PROGRESS,
-    ROUNDING,
     SOLVED,
     STUCK,
     TINY,
@@ -41,6 +40,7 @@ from copsense.batch.postures.search_settings import (
 )
 from copsense.batch.vectors import LARGEST_ANGLE
 from copsense.batch.workspace import WIDTH, Offsets
+from copsense.stance import AT_LIMIT
 
 
 class Found(NamedTuple):
@@ -184,7 +184,7 @@ def _write(
 ) -> None:
     for i in range(found.configurations.shape[1]):
         found.configurations[row, i] = get(W, offset.q + i, lane)
-    which, most = 0, ROUNDING
+    which, most = 0, AT_LIMIT
     if status == SOLVED:
         for i in range(len(plan.low)):
             x = get(W, search.given + 6 + i, lane)

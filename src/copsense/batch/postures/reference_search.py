@@ -21,7 +21,6 @@ from copsense.batch.postures.search_settings import (
     OPPOSITE,
     PATIENCE,
     PROGRESS,
-    ROUNDING,
     SOLVED,
     STUCK,
     TINY,
@@ -29,7 +28,7 @@ from copsense.batch.postures.search_settings import (
     UNSOLVED,
 )
 from copsense.content import ShortRepr
-from copsense.stance import RANK_TOLERANCE, Stance
+from copsense.stance import AT_LIMIT, RANK_TOLERANCE, Stance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -129,7 +128,7 @@ def within_limits(here: Stance, plan: Coordinates) -> tuple[int, int, float]:
     beyond = np.maximum(plan.low - x, x - plan.high)
     which = int(beyond.argmax()) if len(beyond) else 0
     excess = float(beyond.max(initial=0.0))
-    return (BEYOND if excess > ROUNDING else SOLVED), which, excess
+    return (BEYOND if excess > AT_LIMIT else SOLVED), which, excess
 
 
 def _moved(

@@ -9,6 +9,4 @@ MOST_STEPS = 60
 PATIENCE = 6  # steps after which the worst error must have come down ...
 PROGRESS = 0.5  # ... to this share
 OPPOSITE = 0.2  # 1 + trace of a turn over about 155 deg, which is taken as this one
-ROUNDING = 1e-9  # by which a joint may be beyond its limit [rad or m]
-
 SOLVED, UNSOLVED, STUCK, BEYOND, ELSEWHERE = 0, 1, 2, 3, 4  # how a search ended
