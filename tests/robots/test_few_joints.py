@@ -9,6 +9,7 @@ from support.commands import copsense as command
 from support.walkers import BIPED, FULL, NO_ANKLE_ROLL, PITCH_ONLY, bent, walker
 
 import copsense
+from copsense.batch import PostureChart
 from copsense.errors import InsufficientContactsError, UnreachablePostureError
 from copsense.freedom import freedom_notes, held_com_axes, missing_joints
 from copsense.posture import retract
@@ -134,3 +135,12 @@ def test_two_points_are_told_that_they_carry_no_moment():
         text = walker(PITCH_ONLY, trunk=(0.0, aside, 0.2))
         with pytest.raises(InsufficientContactsError, match="no moment about the line"):
             copsense.load_stance(text, contacts=points, posture=bent())
+
+
+def test_a_chart_says_what_holds_the_com_fast(five):
+    found = PostureChart(five, ["com_x", "com_y"], compiled=False).solve([[0.0, 0.0], [0.0, 0.01]])
+    assert found.reasons[0] == ""
+    assert found.reasons[1].startswith(
+        "unreachable: the contacts hold the CoM's y fast: the limb of"
+    )
+    assert "none about x (roll)" in found.reasons[1]

@@ -29,9 +29,11 @@ from copsense.batch.postures.coordinates import (
 from copsense.batch.postures.posture_batch import PostureBatch, empty_postures
 from copsense.batch.postures.reference_search import search_one
 from copsense.batch.postures.search_plan import plan_search
-from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK
+from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK, TOLERANCE
 from copsense.batch.workspace import workspace, workspace_offsets
 from copsense.errors import InvalidInputError, UnreachablePostureError
+from copsense.freedom import held_com_axes, missing_joints
+from copsense.path import COM_COORDINATES
 from copsense.stance import Stance
 
 _BLOCK = 512  # postures that a thread takes at a time
@@ -104,6 +106,10 @@ class PostureChart:
         self._code: Callable[..., None] | None = None
         self.fallback_reason = why_not_covered(stance) if compiled else "nothing is to be compiled"
         self._whole = solved_whole(stance)
+        feet = any(":" in name for name in self.names)  # feet that move carry the CoM along
+        asked = {axis: n for axis, n in enumerate(COM_COORDINATES) if n in self.names and not feet}
+        held = held_com_axes(stance) if asked else ()
+        self._held_axes = {a: self.names.index(n) for a, n in asked.items() if a in held}
         if not self.fallback_reason and stance.false_motions.shape[1]:
             self.fallback_reason = "the contacts hold a motion to second order only"
         if not self.fallback_reason and not stance.robot.model.jointPlacements[1].isIdentity(0.0):
@@ -170,10 +176,24 @@ class PostureChart:
         failed = np.flatnonzero(~batch.converged)
         batch.configurations[failed] = np.nan
         for row in failed:
-            batch.reasons[row] = said.get(int(row)) or self._why_not(
-                int(status[row]), int(which[row]), excess[row], batch.residuals[row]
+            batch.reasons[row] = (
+                said.get(int(row))
+                or (self._held(x[row]) if status[row] != BEYOND else "")
+                or self._why_not(
+                    int(status[row]), int(which[row]), excess[row], batch.residuals[row]
+                )
             )
         return batch
+
+    def _held(self, values: Float[np.ndarray, " k"]) -> str:
+        """Whether a row asks the CoM to go where the contacts hold it fast, and why; or ""."""
+        for axis, at in self._held_axes.items():
+            if abs(values[at] - self.values[at]) > TOLERANCE:
+                lacking = "; ".join(missing_joints(self.stance))
+                return f"unreachable: the contacts hold the CoM's {'xyz'[axis]} fast" + (
+                    f": {lacking}" if lacking else ""
+                )
+        return ""
 
     def _run(
         self,
