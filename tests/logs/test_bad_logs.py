@@ -9,7 +9,7 @@ from support.commands import copsense as command
 from support.results import small_log
 
 from copsense.errors import CopsenseError, InvalidInputError, LogReadError, UnknownNameError
-from copsense.logs import LogMap, WrenchSeries, compare_log, read_log
+from copsense.logs import LogMap, WrenchSeries, apart, compare_log, read_log
 from copsense.logs.one_clock import gaps, ordered
 
 ROWS = 200
@@ -313,3 +313,15 @@ def test_the_command_says_one_line(tmp_path):
     assert "--map" in command("log", path, "--robot", "icub").error
     assert "no log at" in command("log", tmp_path / "b.csv", "--robot", "icub").error
     assert "no mapping at" in command("log", path, "--robot", "icub", "--map", "none.toml").error
+
+
+@pytest.mark.parametrize(("name", "remedy"), [("v5.mat", "-v7.3"), ("plates.c3d", "markers")])
+def test_files_that_are_read_whole_have_a_size_that_is_named(
+    whole_files, tmp_path, monkeypatch, name, remedy
+):
+    path = tmp_path / name
+    path.write_bytes(whole_files[name])
+    monkeypatch.setattr(apart, "_LARGEST", 1000)
+    said = error_of(lambda: read_log(path), LogReadError)
+    assert "is read whole, and the most is 1e-06 GB" in said
+    assert remedy in said

@@ -60,8 +60,9 @@ def reproduce(
     The last line printed is the report's path. Limits are those of the report's section on them; by
     default, what public configurations for this robot use.
     """
-    from copsense.paper.report import check_report_folder, write_report
+    from copsense.paper.report import write_report
     from copsense.paper.reproduce import LIMITS, SWAY_FREQUENCY, reproduce_paper
+    from copsense.reports import check_report_folder
 
     if (log_file is None) != (log_robot is None):
         raise InvalidInputError("--log and --log-robot belong together. Give both or neither.")

@@ -17,19 +17,27 @@ import numpy as np
 from copsense.errors import LogReadError
 
 _PATIENCE = 600.0  # s
+_LARGEST = 1_000_000_000  # bytes of a file that is read whole, several times over in memory
 
 
-def read_apart(module: str, path: Path, what: str) -> dict[str, np.ndarray]:
+def read_apart(module: str, path: Path, what: str, instead: str) -> dict[str, np.ndarray]:
     """The arrays that a module, run as a program, reads from a file.
 
     Args:
         module: its name in this package.
         path: of the file.
         what: it should be, such as ``"C3D file"``.
+        instead: what to do with a file that is too large to be read whole, a sentence.
 
     Raises:
-        LogReadError: it ended with an error, crashed, or did not end.
+        LogReadError: it ended with an error, crashed, or did not end, or the file is too large.
     """
+    size = path.stat().st_size
+    if size > _LARGEST:
+        raise LogReadError(
+            f"{path} is {size / 1e9:.2f} GB: a {what} is read whole, and the most is "
+            f"{_LARGEST / 1e9:g} GB. {instead}"
+        )
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     program = Path(__file__).with_name(f"{module}.py")
     command = [sys.executable, "-P", str(program), str(path.absolute())]

@@ -15,6 +15,8 @@ from copsense.extras import require
 from copsense.logs.apart import read_apart
 from copsense.logs.channel import Channel, LogFile, Progress, reading
 
+_BEGINNING = 1 << 18  # bytes: the header's first byte says where parameters begin, in 512 bytes
+
 
 class C3dFile(LogFile):
     """A C3D file with force plates.
@@ -30,7 +32,9 @@ class C3dFile(LogFile):
         super().__init__(path)
         require("ezc3d", "reading a C3D file")
         _check_whole(path)
-        held = read_apart("c3d_plates", path, "C3D file")
+        held = read_apart(
+            "c3d_plates", path, "C3D file", "Cut it to the trial, or leave its markers out."
+        )
         self.rate: float = float(held.pop("rate"))
         self._wrenches: dict[str, Float[np.ndarray, "N 6"]] = held
         if not held or not self.rate > 0:
@@ -59,22 +63,22 @@ def _check_whole(path: Path) -> None:
     The header's words: parameters' block, magic 0x50, points, analogue numbers a frame, first and
     last frame; the first word of the parameters: reserved, number of blocks, processor.
     """
-    with reading(path, "C3D file"):
-        data = path.read_bytes()
+    with reading(path, "C3D file"), path.open("rb") as file:
+        data, size = file.read(_BEGINNING), path.stat().st_size
     if len(data) < 1024 or data[1] != 0x50:
         raise LogReadError(f"{path} is not a C3D file: its header is not one. Give another file.")
     begin = (data[0] - 1) * 512
-    if begin < 512 or begin + 512 > len(data) or data[begin + 3] - 83 not in (1, 2, 3):
+    if begin < 512 or begin + 512 > size or data[begin + 3] - 83 not in (1, 2, 3):
         raise LogReadError(f"{path} is damaged: its parameters are not where its header says.")
     order = ">" if data[begin + 3] - 83 == 3 else "<"
     points, analogue, first, last = struct.unpack(f"{order}4H", data[2:10])
     (scale,) = struct.unpack(f"{order}f", data[12:16])
     (block,) = struct.unpack(f"{order}H", data[16:18])
-    size = 4 if scale < 0 else 2
+    width = 4 if scale < 0 else 2
     frames = max(0, last - first + 1)
-    need = (block - 1) * 512 + frames * size * (4 * points + analogue)
-    if frames < 1 or block < 2 or need > len(data):
+    need = (block - 1) * 512 + frames * width * (4 * points + analogue)
+    if frames < 1 or block < 2 or need > size:
         raise LogReadError(
             f"{path} is cut short: its header says {frames} frames, {need} bytes, and it has "
-            f"{len(data)}. Copy it again."
+            f"{size}. Copy it again."
         )

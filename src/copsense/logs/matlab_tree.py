@@ -58,7 +58,9 @@ def read_tree(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object] |
 
 
 def _read_v5(path: Path) -> tuple[list[Leaf], list[str], Callable[[], object] | None]:
-    held = read_apart("matlab5", path, "MATLAB file")
+    held = read_apart(
+        "matlab5", path, "MATLAB v5 file", "Save it with save(..., '-v7.3'), which is streamed."
+    )
     notes = [_object(key, "an object") for key in map(str, held.pop("objects"))]
     leaves = []
     for name, value in held.items():

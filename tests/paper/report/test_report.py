@@ -15,7 +15,6 @@ from copsense.cli import copsense as command_line
 from copsense.errors import OutputError
 from copsense.paper.claims import Verdict
 from copsense.paper.report import (
-    check_report_folder,
     render_page,
     report_figures,
     report_files,
@@ -24,7 +23,7 @@ from copsense.paper.report import (
 from copsense.paper.report.words import commands, summary
 from copsense.paper.reproduce.real_robot import PUBLIC_PLACE, RECORDED
 from copsense.plots import render_figure
-from copsense.reports import read_number, typeset
+from copsense.reports import check_report_folder, read_number, typeset
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,8 @@ from copsense.paper.report.errata_page import errata_markdown
 from copsense.paper.report.page import render_page
 from copsense.paper.report.report_files import write_report
 from copsense.paper.report.static_figures import report_figures
-from copsense.reports import ReportFigure, check_report_folder
 
 __all__ = [
-    "ReportFigure",
-    "check_report_folder",
     "errata_markdown",
     "render_page",
     "report_figures",
