@@ -15,7 +15,6 @@ from copsense.reports.report_folder import (
     write_json,
     write_table,
 )
-from copsense.reports.typesetting import typeset
 
 __all__ = [
     "ReportFigure",
@@ -24,7 +23,6 @@ __all__ = [
     "fill_report_folder",
     "read_number",
     "render_template",
-    "typeset",
     "write_json",
     "write_table",
 ]

@@ -23,7 +23,8 @@ from copsense.paper.report import (
 from copsense.paper.report.words import commands, summary
 from copsense.paper.reproduce.real_robot import PUBLIC_PLACE, RECORDED
 from copsense.plots import render_figure
-from copsense.reports import check_report_folder, read_number, typeset
+from copsense.reports import check_report_folder, read_number
+from copsense.reports.typesetting import typeset
 
 
 @pytest.fixture(scope="module")
