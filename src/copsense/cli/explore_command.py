@@ -36,6 +36,7 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
     "--no-meshes": 0,
     "--meshes": 0,
     "--light": 0,
+    "--dark": 0,
     "--json": 0,
 }
 
@@ -62,6 +63,7 @@ _NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
 )
 @click.option("--no-browser", is_flag=True, help="Print the address alone; do not open it.")
 @click.option("--no-meshes", is_flag=True, help="Show the stick figure, not the robot's meshes.")
+@click.option("--dark", is_flag=True, help="A dark page.")
 @click.option("--light", is_flag=True, help="Draw less, for machines without a GPU.")
 @click.option(
     "--export",
@@ -93,6 +95,7 @@ def explore(
     no_browser: bool,
     no_meshes: bool,
     light: bool,
+    dark: bool,
     export: str | None,
     meshes: bool,
     recording: str | None,
@@ -169,7 +172,7 @@ def explore(
         export_page(model, state, Path(export), meshes=meshes, overwrite=force)
         echo_written(export)
         return
-    _serve(model, state, port, host, no_browser, not no_meshes, light, as_json)
+    _serve(model, state, port, host, no_browser, not no_meshes, light, dark, as_json)
 
 
 def _serve(
@@ -180,6 +183,7 @@ def _serve(
     no_browser: bool,
     meshes: bool,
     light: bool,
+    dark: bool,
     as_json: bool,
 ) -> None:
     """Listen until Ctrl-C."""
@@ -193,7 +197,9 @@ def _serve(
     over = threading.Event()
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, lambda *_: over.set())
-    with Explorer(model, state, port=port, host=host, meshes=meshes, light=light) as explorer:
+    with Explorer(
+        model, state, port=port, host=host, meshes=meshes, light=light, dark=dark
+    ) as explorer:
         if as_json:
             echo_json({"url": explorer.url, "seconds": explorer.seconds})
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,19 @@ from copsense.explore.view import CriterionView, View
 Colour = tuple[int, int, int]
 
 BONE: Colour = (150, 160, 172)
-INK: Colour = (29, 39, 51)
-GROUND: Colour = (205, 212, 219)
-SOLE: Colour = (70, 84, 99)
-COM: Colour = (29, 39, 51)
+MEASURED: Colour = (120, 30, 160)
+
+
+class Inks(NamedTuple):
+    """What lines are drawn with, so that they are seen on the page."""
+
+    line: Colour
+    sole: Colour
+    ground: Colour
+
+
+ON_LIGHT = Inks((29, 39, 51), (70, 84, 99), (205, 212, 219))
+ON_DARK = Inks((226, 231, 237), (160, 174, 190), (74, 82, 92))
 # As in the figures: the paper's two criteria, then others in order.
 NAMED: Mapping[str, Colour] = {"minimum-wrench": (213, 94, 0), "minimum-torque": (0, 114, 178)}
 OTHERS: tuple[Colour, ...] = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
@@ -79,9 +88,17 @@ def effort_colour(share: float) -> Colour:
 
 
 class Scene:
-    """The things that show a robot, and their places and colours by `show`."""
+    """The things that show a robot, and their places and colours by `show`.
 
-    def __init__(self, server: Any, view: View, shape: Shape, *, light: bool = False) -> None:
+    Attributes:
+        height: of the robot [m].
+    """
+
+    height: float
+
+    def __init__(
+        self, server: Any, view: View, shape: Shape, *, light: bool = False, dark: bool = False
+    ) -> None:
         """Put them there.
 
         Args:
@@ -89,7 +106,9 @@ class Scene:
             view: the first one; it says how many things of each kind there are.
             shape: the robot's meshes.
             light: leave out what slow machines cannot draw.
+            dark: for a dark page.
         """
+        self._inks = ON_DARK if dark else ON_LIGHT
         self._scene, self._shape = server.scene, shape
         self.height = max(float(np.ptp(view.bones[..., 2])), 0.2)
         self._unit = self.height / 100.0
@@ -97,14 +116,14 @@ class Scene:
         self._ground(view)
         self._robot(view)
         n, u = len(view.contacts), self._unit
-        self._soles = self._lines("/soles", 3.0, SOLE)
+        self._soles = self._lines("/soles", 3.0, self._inks.sole)
         self._axes = [
             self._scene.add_frame(f"/contacts/{k}", axes_length=8 * u, axes_radius=0.4 * u)
             for k in range(n)
         ]
-        self._com = self._ball("/com", 1.6 * u, COM)
-        self._plumb = self._lines("/plumb", 1.5, COM)
-        self._shadow = self._ball("/com on the ground", 0.9 * u, COM)
+        self._com = self._ball("/com", 1.6 * u, self._inks.line)
+        self._plumb = self._lines("/plumb", 1.5, self._inks.line)
+        self._shadow = self._ball("/com on the ground", 0.9 * u, self._inks.line)
         self._balls: dict[str, list[Any]] = {}
         self._arrows: dict[str, Any] = {}
         self._outlines: dict[str, Any] = {}
@@ -128,7 +147,7 @@ class Scene:
         """Where measured centres of pressure are, in the world; None for none."""
         if self._reference is None and points is not None:
             self._reference = self._scene.add_point_cloud(
-                "/measured", points, INK, point_size=2.2 * self._unit, point_shape="diamond"
+                "/measured", points, MEASURED, point_size=2.2 * self._unit, point_shape="diamond"
             )
         if self._reference is not None:
             self._reference.visible = points is not None
@@ -150,7 +169,7 @@ class Scene:
         ends = np.array([ticks[0], ticks[-1]])
         across = [[[x, y, 0] for y in ends] for x in ticks]
         along = [[[x, y, 0] for x in ends] for y in ticks]
-        handle = self._lines("/ground", 1.0, GROUND)
+        handle = self._lines("/ground", 1.0, self._inks.ground)
         handle.points = np.array(across + along) + np.array([*middle, view.ground - _LIFT])
 
     def _robot(self, view: View) -> None:
@@ -234,7 +253,7 @@ class Scene:
         found = {each.name: each.corners for each in view.regions or ()}
         for name, corners in found.items():
             if name not in self._outlines:
-                colour = colours.get(name, INK)
+                colour = colours.get(name, self._inks.line)
                 self._outlines[name] = self._lines(f"/region/{len(self._outlines)}", 2.5, colour)
             flat = np.column_stack([corners, np.full(len(corners), view.ground)])
             self._outlines[name].points = _closed([flat], _LIFT)

@@ -50,6 +50,7 @@ class Explorer:
         host: str = LOOPBACK,
         meshes: bool = True,
         light: bool = False,
+        dark: bool = False,
     ) -> None:
         """Draw the first view and begin to listen.
 
@@ -60,6 +61,7 @@ class Explorer:
             host: where to listen.
             meshes: show the robot's meshes; if not, the stick figure.
             light: leave out what machines without a GPU cannot draw.
+            dark: a dark page.
 
         Raises:
             OutputError: nothing can listen there.
@@ -73,17 +75,19 @@ class Explorer:
         first = model.view(state)
         self.server = GuardedServer(port, host)
         try:
-            self._begin(state, first, problem, light)
+            self._begin(state, first, problem, light, dark)
         except BaseException:
             self.server.stop()
             raise
         self.seconds = time.monotonic() - begun
 
-    def _begin(self, state: State, first: View, problem: list[str], light: bool) -> None:
+    def _begin(
+        self, state: State, first: View, problem: list[str], light: bool, dark: bool
+    ) -> None:
         """Fill the window, and start the thread."""
         viser, model = self.server.viser, self.model
         viser.gui.configure_theme(
-            show_logo=False, show_share_button=False, control_width="large", dark_mode=False
+            show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
         )
         viser.gui.set_panel_label(f"copsense explore: {model.stance.robot.name}")
         self._worker = Worker(model, self._publish, stages=self._stages())
@@ -101,7 +105,7 @@ class Explorer:
             },
             playback=model.playback if isinstance(model, PlayedModel) else None,
         )
-        self._scene = Scene(viser, first, self._shape, light=light)
+        self._scene = Scene(viser, first, self._shape, light=light, dark=dark)
         self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
         self._compiling: threading.Thread | None = None
         place_camera(viser, first)

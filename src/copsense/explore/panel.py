@@ -27,6 +27,7 @@ _FRICTION = 0.5
 _KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": "Feet"}
 _CURVE_HEIGHT = 150  # pixels
 _DEEPEST = 40.0  # mm outside the soles that the curve shows
+_CELL = "padding:0 .4em .1em 0;max-width:8em;overflow-wrap:anywhere"
 _LEAST_SPAN = 0.1  # mm or deg, of a slider
 
 
@@ -360,7 +361,8 @@ class Panel:
         low = max(low, -_DEEPEST)  # far outside nobody compares
         room = 0.05 * (high - low) + 1.0
         scales = {
-            "x": {"time": False},
+            # Said outright: left to the browser, it now and then stays at 0 to 1.
+            "x": {"time": False, "auto": False, "range": (float(y.min()), float(y.max()) + 1e-9)},
             "y": {"auto": False, "range": (low - room, high + room)},
         }
         # The cursor: an upright line at the CoM's y, two points of a series of its own.
@@ -509,7 +511,7 @@ def _table_html(view: View, colours: Mapping[str, Colour]) -> str:
             )
             last = criterion
         cells = "".join(
-            f'<td style="padding:0 .4em .1em 0">{_text(word)}</td>'
+            f'<td style="{_CELL}">{_text(word)}</td>'
             for word in (contact, load, cop, margin, travel)
         )
         parts.append(f"<tr>{cells}</tr>")
