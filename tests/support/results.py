@@ -209,7 +209,7 @@ def all_results(icub) -> dict[str, object]:
         ),
         "state": State(("icub",), {"com_y": Setting(0.01, "m")}, limits=LIMITS),
         "playback": Playback(
-            Path("run.nc"), "time", "s", bar.q[:2], bar.q[None], np.arange(2), None
+            Path("run.nc"), "time", "s", np.zeros(1), bar.q[None], np.zeros(1, dtype=int), None
         ),
         "mesh": JointMesh(1, np.zeros((3, 3)), np.arange(3)[None]),
         "view": explored.add_regions(shown),
