@@ -12,12 +12,14 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from dataclasses import replace
 
 import pytest
 from support.commands import copsense as command
 
 from copsense.errors import OutputError
 from copsense.explore import Model, Setting, State
+from copsense.limits import Limits
 
 viser = pytest.importorskip("viser", reason="the extra explore is not installed")
 
@@ -166,6 +168,26 @@ def test_nobody_opens_a_tunnel(explorer, monkeypatch):
         client.until("copsense analyse")
         time.sleep(0.3)
     assert not opened
+
+
+def test_what_the_command_asked_for_stays_to_the_last_digit(stance_of):
+    state = State(
+        ("four_bar",),
+        {"com_y": Setting(0.0123456789, "m")},
+        criteria=("minimum-wrench", "stiffness:1000", "minimum-torque"),
+        length=0.3,
+        limits=Limits(normal_force=3.0, friction=0.777, cop_margin=None),
+        overlays=frozenset({"curve"}),
+    )
+    with Explorer(Model(stance_of("four_bar")), state, meshes=False, light=True) as explorer:
+        panel = explorer._panel
+        assert panel.read() == state
+        panel._torque.value = True  # nothing else of the limits changes
+        assert panel.read().limits == replace(state.limits, torque="model")
+        panel._length.value = -1.0
+        assert panel.read() == replace(
+            state, length=0.1, limits=replace(state.limits, torque="model")
+        )
 
 
 def test_a_port_that_is_taken_and_a_host_that_is_not_ours_are_said_at_once(explorer):

@@ -162,6 +162,7 @@ def explore(
         "own" if limits is None or within is None else within,
         frozenset({"curve"}),
     )
+    model.criteria_of(state)  # or an error before the window opens
     if kept is not None:
         source, folders = (file.source, file.package_dirs) if file else (robot or "", ())
         folders = options["package_dirs"] or folders

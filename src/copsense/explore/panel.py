@@ -6,6 +6,7 @@ import html
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -28,6 +29,7 @@ _KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": 
 _CURVE_HEIGHT = 150  # pixels
 _DEEPEST = 40.0  # mm outside the soles that the curve shows
 _CELL = "padding:0 .4em .1em 0;max-width:8em;overflow-wrap:anywhere"
+_ORDINALS = {1: "first", 2: "second", 3: "third"}
 _LEAST_SPAN = 0.1  # mm or deg, of a slider
 
 
@@ -165,10 +167,12 @@ class Panel:
             names.insert(0, FILE)
         first = FILE if FILE in names else "minimum-wrench"
         second = NONE if FILE in names else "minimum-torque"
-        asked = [*state.criteria, NONE, NONE][:2] if state.criteria else [first, second]
+        asked = [*state.criteria] or [first, second]
+        asked += [NONE] * (2 - len(asked))
         with gui.add_folder("Criteria"):
             self._criteria = []
-            for label, name in zip(("first", "second"), asked, strict=True):
+            for number, name in enumerate(asked, start=1):
+                label = _ORDINALS.get(number, f"number {number}")
                 options = [*dict.fromkeys([*names, name, NONE])]
                 handle = gui.add_dropdown(label, tuple(options), initial_value=name)
                 handle.on_update(self._any)
@@ -178,7 +182,7 @@ class Panel:
                 min=-2.0,
                 max=1.0,
                 step=0.01,
-                initial_value=round(math.log10(state.length), 2),
+                initial_value=_logarithm(state.length),
                 hint="length that makes moments comparable with forces in minimum-wrench",
             )
             self._length.on_update(self._any)
@@ -208,11 +212,18 @@ class Panel:
                 "friction", min=0.05, max=1.5, step=0.01, initial_value=friction
             )
             self._torque = gui.add_checkbox(
-                "torques of the model", limits is not None and limits.torque == "model"
+                "torque limits", limits is not None and limits.torque is not None
             )
             for handle in (self._limited, self._friction, self._torque):
                 handle.on_update(self._limits_changed)
-        self._own_limits = state.limits
+        self._limits_given, self._friction_given = state.limits, friction
+        self._limits_touched = False
+        self._judged_given = self._judged
+
+    @property
+    def _judged(self) -> list[object]:
+        """What the controls of the criteria show."""
+        return [each.value for each in (*self._criteria, *self._weights.values())]
 
     def _showing(self, meshes: bool) -> None:
         gui = self._gui
@@ -245,44 +256,58 @@ class Panel:
         for name in self._model.coordinates:
             c = self._model.coordinates[name]
             if name in self.touched and (held or c.kind in ("com", "joint")):
-                coordinates[name] = Setting(_meant(c, self._sliders[name].value), c.unit)
+                coordinates[name] = self._read_coordinate(c)
         overlays = {"curve": self._curve_on.value, "regions": self._regions.value}
         return State(
             self._model.words,
             coordinates,
             held,
             self._read_criteria(),
-            _power(self._length.value),
+            self._read_length(),
             self._read_limits(),
             frozenset(name for name, on in overlays.items() if on),
         )
 
+    def _read_coordinate(self, c: Coordinate) -> Setting:
+        given, at = self._given.coordinates.get(c.name), self._sliders[c.name].value
+        if given is not None and at == round(_shown(c, given.value), 1):
+            return given  # to the last digit, as it was asked for
+        return Setting(_meant(c, at), c.unit)
+
+    def _read_length(self) -> float:
+        given = self._given.length
+        return given if self._length.value == _logarithm(given) else _power(self._length.value)
+
     def _read_criteria(self) -> tuple[str, ...]:
+        if self._judged == self._judged_given:
+            return self._given.criteria
         weights = {group: _power(slider.value) for group, slider in self._weights.items()}
-        weighted = weights_text(weights)
         named = [handle.value for handle in self._criteria]
-        if named == [FILE, NONE] or (
-            named == ["minimum-wrench", "minimum-torque"]
-            and weighted == "minimum-torque"
-            and self._length.value == 0.0
-            and [c.name for c in self._model.criteria] == named
-        ):
+        if FILE in named:  # those alone: not each of them has a name
             return ()
-        found = []
-        for name in named:
-            if name == FILE:
-                found += [c.name for c in self._model.criteria if c.name in CRITERIA]
-            elif name != NONE:
-                found.append(weighted if name == "minimum-torque" else name)
+        found = [
+            weights_text(weights) if name == "minimum-torque" else name
+            for name in named
+            if name != NONE
+        ]
         return tuple(dict.fromkeys(found)) or ("minimum-torque",)
 
     def _read_limits(self) -> Limits | Literal["own"] | None:
-        if isinstance(self._own_limits, str):
-            return self._own_limits
+        if not self._limits_touched:
+            return self._limits_given
         if not self._limited.value:
             return None
-        torque: Literal["model"] | None = "model" if self._torque.value else None
-        return Limits(friction=round(self._friction.value, 2), torque=torque)
+        base = self._limits_given if isinstance(self._limits_given, Limits) else self._model.limits
+        friction: Any = round(self._friction.value, 2)
+        torque: Any = "model" if self._torque.value else None
+        if base is None:
+            return Limits(friction=friction, torque=torque)
+        # What has no control here stays as it was given.
+        if self._friction.value == self._friction_given:
+            friction = base.friction
+        if self._torque.value and base.torque is not None:
+            torque = base.torque
+        return replace(base, friction=friction, torque=torque)
 
     def shown(self) -> Shown:
         """What is to be drawn."""
@@ -413,7 +438,7 @@ class Panel:
 
     def _limits_changed(self, event: object) -> None:
         if not self._assigning:
-            self._own_limits = None  # from now on those of the controls
+            self._limits_touched = True
             self._changed()
 
     def _mode_changed(self, event: object) -> None:
@@ -460,6 +485,11 @@ def _meant(c: Coordinate, shown: float) -> float:
     value = shown / 1e3 if c.unit == "m" else math.radians(shown)
     # To a nanometre: homes that miss zero by rounding would make commands long.
     return round(value if c.kind == "joint" else c.home + c.sign * value, 9)
+
+
+def _logarithm(length: float) -> float:
+    """What the slider of L shows of a length."""
+    return min(max(round(math.log10(length), 2), -2.0), 1.0)
 
 
 def _power(logarithm: float) -> float:

@@ -182,8 +182,22 @@ def read_mesh(path: Path) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "f 
         count = int(np.frombuffer(raw, "<u4", 1, _HEADER - 4)[0])
         if len(raw) == _HEADER + count * _FACET.itemsize:
             corners = np.frombuffer(raw, _FACET, count, _HEADER)["corners"].reshape(-1, 3)
-            return _joined(corners.astype(float))
-    return _read_other(path)
+            return _whole(path, *_joined(corners.astype(float)))
+    return _whole(path, *_read_other(path))
+
+
+def _whole(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh that has triangles, and numbers.
+
+    Raises:
+        ModelLoadError: it has not: the file is cut short, say.
+    """
+    if not len(faces) or not np.isfinite(vertices).all():
+        what = "numbers that are not finite" if len(faces) else "no triangle"
+        raise ModelLoadError(
+            f"mesh {path} holds {what}. Fetch the file anew, or leave meshes out with --no-meshes."
+        )
+    return vertices, faces
 
 
 def _read_other(path: Path) -> tuple[np.ndarray, np.ndarray]:
