@@ -14,6 +14,7 @@ from support import shape_checks
 shape_checks.install()
 
 import copsense  # noqa: E402
+from copsense.robots.presets import shared_presets  # noqa: E402
 
 # Where several processes share the tests, each takes the next module: the longest come first, so
 # that none is left alone at the end, and before them the kernel that others need is compiled.
@@ -56,6 +57,13 @@ def pytest_collection_finish():
 
 def pytest_runtest_setup(item):
     shape_checks.begin_test()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def presets_read_once():
+    """Models are never changed after construction, and to read one is half of many a command."""
+    with shared_presets():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from copsense.files import load_configurations
         ("analyse icub --com-x inf", "the CoM's x [m] is inf"),
         ("analyse icub --width 0", "the stance width [m] is 0.0"),
         ("analyse icub --width nan", "the stance width [m] is nan"),
-        ("analyse icub --width 5", "no posture of 'icub'"),
+        ("analyse icub --width 5", "'icub' reaches 0.73 m from its base"),
         ("analyse icub --contact l_sole --width 1", "Leave width out"),
         ("analyse icub --characteristic-length 0", "the characteristic length L [m] is 0.0"),
         ("analyse icub --characteristic-length nan", "the characteristic length L [m] is nan"),
