@@ -13,6 +13,7 @@ from copsense.errors import (
     ModelLoadError,
     UnknownNameError,
 )
+from copsense.robots.presets import shared_presets
 
 
 @pytest.fixture(params=[Robot.from_urdf, copsense.load_robot], ids=["from_urdf", "load_robot"])
@@ -227,7 +228,8 @@ def test_a_robot_whose_package_is_absent_names_the_extra(robot, package, extra, 
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("sys.path", [])
     monkeypatch.setattr("sys.prefix", "/nowhere")
-    with pytest.raises(MissingExtraError, match=rf"{package}.*pip install \"copsense\[{extra}\]\""):
+    said = rf"{package}.*pip install \"copsense\[{extra}\]\""
+    with shared_presets(), pytest.raises(MissingExtraError, match=said):
         copsense.load_robot(robot)
 
 

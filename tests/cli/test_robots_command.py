@@ -3,6 +3,8 @@
 import pytest
 from support.commands import copsense
 
+from copsense.robots.presets import shared_presets
+
 
 def test_robots_answers_in_json_with_every_joint():
     rows = {row["name"]: row for row in copsense("robots", "--json").json["robots"]}
@@ -13,10 +15,11 @@ def test_robots_answers_in_json_with_every_joint():
 
 def test_robots_lists_a_robot_that_is_not_installed_with_the_remedy(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    answer = copsense("robots")
+    with shared_presets():  # of none that was read before
+        answer, data = copsense("robots"), copsense("robots", "--json")
     assert answer.code == 0
     assert answer.out.count('pip install "copsense[icub]"') == 1
     assert "not installed: icub, iCubDarmstadt01" in answer.out
-    row = next(r for r in copsense("robots", "--json").json["robots"] if r["name"] == "icub")
+    row = next(r for r in data.json["robots"] if r["name"] == "icub")
     assert row["joints"] == []
     assert "icub-models" in row["missing"]
