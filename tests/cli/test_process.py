@@ -17,7 +17,7 @@ COMMANDS = (
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",
-    "icub_models", "numba", "zarr", "distributed", "tqdm",
+    "icub_models", "numba", "zarr", "distributed", "tqdm", "viser",
 }  # fmt: skip
 
 
