@@ -5,7 +5,7 @@ from copsense.controllers.controller import Command, Controller, Observation, co
 from copsense.controllers.gains import STIFF, Gains, public_gains
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.loading import controller_code, load_controller
-from copsense.controllers.sharing import ShareByCriterion, ShareLoad
+from copsense.controllers.sharing import Choice, ShareByCriterion, ShareLoad
 from copsense.controllers.target import (
     Hold,
     PathReference,
@@ -20,6 +20,7 @@ from copsense.load_problem import LoadProblem
 __all__ = [
     "STIFF",
     "BalancingController",
+    "Choice",
     "Command",
     "Controller",
     "Gains",
