@@ -15,7 +15,7 @@ import copsense
 from copsense import log_report
 from copsense.errors import OutputError
 from copsense.identification import identify_log
-from copsense.log_report import log_figures, slope_rows, write_log_report
+from copsense.log_report import draw_log_figures, slope_rows, write_log_report
 from copsense.logs import compare_log
 from copsense.logs.sway_fit import SlopeEstimate
 from copsense.paper.report.real_section import real_figures, real_rows, real_words
@@ -35,8 +35,8 @@ def quick():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             log_report.log_page,
-            "log_figures",
-            lambda c: [replace(f, draw=SimpleNamespace) for f in log_figures(c)],
+            "draw_log_figures",
+            lambda c: [replace(f, draw=SimpleNamespace) for f in draw_log_figures(c)],
         )
         patch.setattr(report_folder, "lay_out", lambda figure: None)
         patch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")
@@ -62,7 +62,7 @@ def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(page, comparis
     assert all(img["src"].startswith("data:image/svg+xml;base64,") for img in page.all("img"))
     names = {attributes.get("id") for _, attributes in page.tags}
     assert all(a["href"][1:] in names for a in page.all("a"))
-    assert [f["id"] for f in page.all("figure")] == [f.name for f in log_figures(comparison)]
+    assert [f["id"] for f in page.all("figure")] == [f.name for f in draw_log_figures(comparison)]
 
 
 def test_the_page_has_the_numbers_and_what_the_audit_found(page, comparison):
@@ -88,7 +88,7 @@ def test_the_data_beside_the_page_are_the_comparison(folder, comparison):
 
 
 def test_each_figure_draws_with_its_axes_named(comparison):
-    for figure in log_figures(comparison):
+    for figure in draw_log_figures(comparison):
         (ax,) = figure.draw().axes
         assert ax.get_xlabel(), figure.name
         assert ax.get_ylabel() or figure.name == "log_intervals"

@@ -37,7 +37,7 @@ from copsense.controllers.dynamics import StandingDynamics
 from copsense.controllers.gains import STIFF, Gains
 from copsense.controllers.limited import ShareWithinLimits
 from copsense.controllers.sharing import ShareByCriterion, ShareLoad, well_determined
-from copsense.controllers.unheld import check_unheld
+from copsense.controllers.stability import check_unheld
 from copsense.criterion import Criterion, check_criterion, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits

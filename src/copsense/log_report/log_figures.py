@@ -21,7 +21,7 @@ from copsense.plots.log_plots import (
 from copsense.reports import ReportFigure
 
 
-def log_figures(comparison: LogComparison, prefix: str = "log") -> tuple[ReportFigure, ...]:
+def draw_log_figures(comparison: LogComparison, prefix: str = "log") -> tuple[ReportFigure, ...]:
     """The figures of a comparison, after [Romano2016] Figs. 6 to 9.
 
     Args:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from copsense.log_report.log_figures import log_figures
+from copsense.log_report.log_figures import draw_log_figures
 from copsense.log_report.log_words import answer, reach, slope_tables
 from copsense.logs import LogComparison
 from copsense.logs.finding import Finding
@@ -49,7 +49,7 @@ def write_log_report(
     """
 
     def make(staging: Path) -> str:
-        figures = log_figures(comparison)
+        figures = draw_log_figures(comparison)
         pictures = draw_figures(figures, staging)
         write_json(staging / DATA / "comparison.json", comparison.to_dict())
         write_table(staging / DATA / "rows.csv", *_rows(comparison))

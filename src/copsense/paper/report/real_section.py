@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from copsense.log_report import log_figures
+from copsense.log_report import draw_log_figures
 from copsense.log_report.log_words import BADGES, answer, reach
 from copsense.paper.reproduce import RECORDED, RealRobot
 from copsense.paper.reproduce.real_robot import PUBLIC_LOG, PUBLIC_URDF
@@ -25,7 +25,7 @@ def real_figures(real: RealRobot | None) -> tuple[ReportFigure, ...]:
     """The figures of the log that was given; none without one."""
     if real is None:
         return ()
-    found = log_figures(real.comparison, "real")
+    found = draw_log_figures(real.comparison, "real")
     return tuple(replace(f, section=_SECTION) for f in found if f.name in _SHOWN)
 
 
