@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,9 +11,16 @@ from typing import Any, Literal
 import numpy as np
 
 from copsense.criterion import CRITERIA
-from copsense.errors import InvalidInputError
-from copsense.explore.drawing import OPACITY, Colour, Shown, criterion_colours, effort_colour
+from copsense.explore.drawing import OPACITY, Colour, Shown, criterion_colours
 from copsense.explore.model import Coordinate, Model
+from copsense.explore.panel_html import (
+    asked_html,
+    copy_html,
+    css,
+    notes_html,
+    status_html,
+    table_html,
+)
 from copsense.explore.playback import SWEEP_SECONDS, Playback
 from copsense.explore.state import Setting, State, weights_text
 from copsense.explore.view import View
@@ -28,7 +34,6 @@ _FRICTION = 0.5
 _KINDS = {"com": "Centre of mass", "trunk": "Trunk", "joint": "Joints", "foot": "Feet"}
 _CURVE_HEIGHT = 150  # pixels
 _DEEPEST = 40.0  # mm outside the soles that the curve shows
-_CELL = "padding:0 .4em .1em 0;max-width:8em;overflow-wrap:anywhere"
 _ORDINALS = {1: "first", 2: "second", 3: "third"}
 _LEAST_SPAN = 0.1  # mm or deg, of a slider
 
@@ -362,11 +367,11 @@ class Panel:
     def write(self, view: View, status: str, save: str = "") -> None:
         """Show a view's words and numbers."""
         colours = criterion_colours([each.name for each in view.criteria])
-        self._status.content = _status_html(view, status)
-        self._table.content = _table_html(view, colours)
-        self._asked.content = _asked_html(view.state, self._model)
-        self._copy.content = _copy_html(self._model, view.state, save)
-        self._more.content = _notes_html(view)
+        self._status.content = status_html(view, status)
+        self._table.content = table_html(view, colours)
+        self._asked.content = asked_html(view.state, self._model)
+        self._copy.content = copy_html(self._model, view.state, save)
+        self._more.content = notes_html(view)
         self._plot(view, colours)
 
     def _plot(self, view: View, colours: Mapping[str, Colour]) -> None:
@@ -409,7 +414,7 @@ class Panel:
         series: tuple[Any, ...] = (
             {"label": f"{name} [{shown}]"},
             *(
-                {"label": each, "stroke": _css(colour), "width": 2}
+                {"label": each, "stroke": css(colour), "width": 2}
                 for each, colour in list(colours.items())[: len(rows)]
             ),
             {"label": "now", "stroke": "#555", "width": 1.5},
@@ -507,98 +512,3 @@ def _widen(slider: Any, value: float) -> None:
 def _span(rows: Sequence[np.ndarray]) -> tuple[float, float]:
     found = np.concatenate([row[np.isfinite(row)] for row in rows] or [np.zeros(1)])
     return (float(found.min()), float(found.max())) if len(found) else (0.0, 1.0)
-
-
-def _css(colour: Colour) -> str:
-    return f"rgb({colour[0]},{colour[1]},{colour[2]})"
-
-
-def _text(value: object) -> str:
-    return html.escape(str(value), quote=True)
-
-
-def _status_html(view: View, status: str) -> str:
-    revision = f'<span id="copsense-revision" hidden>{view.revision}</span>'
-    said = f'<div style="opacity:.7">{_text(status)}</div>' if status else ""
-    if view.reason:
-        said += (
-            '<div style="background:#b3261e;color:white;padding:.4em .6em;border-radius:.3em">'
-            f"{_text(view.reason)} The last posture is shown.</div>"
-        )
-    else:
-        said += f'<div style="font-weight:600">{_text(view.verdict)}.</div>'
-    return f'<div style="padding:0 .8em;font-size:.85em;line-height:1.35">{revision}{said}</div>'
-
-
-def _table_html(view: View, colours: Mapping[str, Colour]) -> str:
-    parts, last = [], ""
-    for criterion, contact, load, cop, margin, travel in view.rows:
-        if criterion != last:
-            dot = _css(colours[criterion])
-            parts.append(
-                f'<tr><th colspan="5" style="text-align:left;padding-top:.5em">'
-                f'<span style="color:{dot}">&#9679;</span> {_text(criterion)}</th></tr>'
-            )
-            last = criterion
-        cells = "".join(
-            f'<td style="{_CELL}">{_text(word)}</td>'
-            for word in (contact, load, cop, margin, travel)
-        )
-        parts.append(f"<tr>{cells}</tr>")
-    head = "".join(
-        f'<td style="opacity:.6;padding:0 .3em 0 0">{word}</td>'
-        for word in ("contact", "load", "CoP x, y", "margin", "CoM travel")
-    )
-    shades = ",".join(_css(effort_colour(share)) for share in (0.0, 0.5, 1.0))
-    return (
-        '<div style="padding:0 .8em;overflow-x:auto"><table style="font-size:.72em;'
-        f'border-spacing:0;width:100%"><tr>{head}</tr>{"".join(parts)}</table>'
-        '<div style="font-size:.68em;opacity:.7">lengths in mm; joints by torque, from none to its '
-        'limit (the largest, where the model has no limits): <span style="display:inline-block;'
-        f'width:5em;height:.7em;background:linear-gradient(90deg,{shades})"></span></div></div>'
-    )
-
-
-def _asked_html(state: State, model: Model) -> str:
-    def said(name: str, setting: Setting) -> str:
-        scaled = setting.value * 1e3 if setting.unit == "m" else math.degrees(setting.value)
-        return f"{name} = {round(scaled, 1) + 0.0:g} {'mm' if setting.unit == 'm' else 'deg'}"
-
-    asked = ", ".join(said(n, s) for n, s in state.coordinates.items())
-    return (
-        '<div style="padding:0 .8em;font-size:.75em;opacity:.8">'
-        f"asked for, in world axes: {_text(asked or 'nothing, the stance itself')}</div>"
-    )
-
-
-def _copy_html(model: Model, state: State, save: str) -> str:
-    try:
-        command, python = model.code(state)
-    except InvalidInputError as error:
-        return f'<div style="padding:0 .8em;font-size:.75em">no command: {_text(error)}</div>'
-    buttons = "".join(
-        '<button style="margin:0 .5em .3em 0;padding:.25em .7em;border-radius:.3em;border:1px solid'
-        ' #8888;cursor:pointer;font-size:.8em" data-text="'
-        f'{_text(text)}" onclick="navigator.clipboard.writeText(this.dataset.text)'
-        ".then(() => {const was = this.innerText; this.innerText = 'copied';"
-        f'setTimeout(() => this.innerText = was, 900)}})">{label}</button>'
-        for label, text in (("copy command", command), ("copy Python", python))
-    )
-    saved = f'<div style="font-size:.75em">{_text(save)}</div>' if save else ""
-    return (
-        f'<div style="padding:0 .8em">{buttons}{saved}<code id="copsense-command" style="display:'
-        f'block;font-size:.68em;overflow-wrap:anywhere;opacity:.8">{_text(command)}</code></div>'
-    )
-
-
-def _notes_html(view: View) -> str:
-    lines = [*(view.binding or ()), *view.notes]
-    for each in view.criteria:
-        lines += [f"{each.name}, active: {'; '.join(each.active[:6])}"] * bool(each.active)
-        lines += [f"{each.name}, nearest: {'; '.join(each.nearest)}"] * bool(each.nearest)
-    items = "".join(f"<li>{_text(line)}</li>" for line in lines)
-    return (
-        f'<ul style="padding:0 .8em 0 2em;font-size:.75em;line-height:1.35">{items}</ul>'
-        if items
-        else ""
-    )
