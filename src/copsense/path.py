@@ -502,6 +502,9 @@ class _Along:
     held: Mapping[str, float]
     cost: PostureCost | None
 
+    def __post_init__(self) -> None:
+        freeze(self, "held")
+
     def __call__(self, value: float, near: Stance) -> tuple[Stance, Float[np.ndarray, " nv"]]:
         asked = {**self.held, self.coordinate: value}
         x, y, z = (asked.get(name) for name in COM_COORDINATES)

@@ -46,12 +46,14 @@ _OPTIONS = (
 )
 
 
-encoders_option = click.option(
-    "--encoders",
-    metavar="ANGLE",
-    help="Standard deviation of each encoder's constant error, such as 0.5deg, which the intervals "
-    "then have in them; default none.",
-)
+def encoders_option(command: F) -> F:
+    """The option --encoders."""
+    return click.option(
+        "--encoders",
+        metavar="ANGLE",
+        help="Standard deviation of each encoder's constant error, such as 0.5deg, which the "
+        "intervals then have in them; default none.",
+    )(command)
 
 
 class LogSubject(NamedTuple):

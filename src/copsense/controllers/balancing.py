@@ -92,7 +92,7 @@ class BalancingController:
         self.criterion = criterion
         self.gains = gains
         self.limits = limits
-        self.feedforward = bool(feedforward)
+        self.feedforward: bool = bool(feedforward)
         self.name: str = name or criterion.name
         driven = bool(stance.robot.drives or stance.loads)
         self._dynamics = (DrivenDynamics if driven else StandingDynamics)(stance)
