@@ -38,8 +38,13 @@ demo: $(RUN_STAMP) ## reproduce the paper; print where the report is
 	@$(BIN)/copsense reproduce --output $(REPRODUCTION) --force
 
 .PHONY: test
-test: lint format types imports ## every check, then every test
+test: checks ## every check, then every test
 	$(BIN)/pytest $(PYTEST_ARGS)
+
+.PHONY: checks
+checks: $(DEV_STAMP) ## lint, format, types and imports, two at a time
+	@$(MAKE) --no-print-directory -j2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) \
+	    lint format types imports
 
 .PHONY: pytest
 pytest: $(DEV_STAMP) ## the tests alone

@@ -292,13 +292,19 @@ def _search(
     axes = [np.linspace(a, b, grid) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(axes))
 
+    known: dict[bytes, Score | None] = {}  # a search begins and ends where one has been
+
     def at(logs: np.ndarray) -> Score | None:
+        if (key := logs.tobytes()) not in known:
+            known[key] = judge(family, values_at(logs))
+        return known[key]
+
+    def values_at(logs: np.ndarray) -> list[float]:
         # A bound stays what it was given as.
-        inside = [
+        return [
             bounds[int(log > a)] if log in (a, b) else float(np.exp(log))
             for log, a, b, bounds in zip(logs, low, high, family.bounds, strict=True)
         ]
-        return judge(family, inside)
 
     looked: list[tuple[np.ndarray, Score]] = []
     for point in points:
@@ -315,12 +321,11 @@ def _search(
     # Of equals, such as where the path ends before any limit, the one that strains least.
     where, best = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
     for size in _SIMPLEX:
-        calls = 0
+        before = len(known)
 
         def measure(logs: np.ndarray) -> float:
-            nonlocal calls
-            calls += 1
-            tell(1)
+            if logs.tobytes() not in known:
+                tell(1)
             return cost(at(logs))
 
         # Inwards from a bound: clipped to it, the simplex would be flat and never leave it.
@@ -338,7 +343,7 @@ def _search(
                 "maxfev": most,
             },
         )
-        tell(most - calls)
+        tell(most - (len(known) - before))
         found = at(refined.x)
         if found and cost(found) < cost(best) - _ROUNDING:
             where, best = refined.x, found

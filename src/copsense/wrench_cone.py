@@ -45,7 +45,7 @@ def unit_cone(sole: Polygon, mu: float, sides: int) -> tuple[Float[np.ndarray, "
         faces[:, :5] = faces[:, :5] @ view
         faces /= np.linalg.norm(faces[:, :5], axis=1, keepdims=True)
         if (array @ faces[:, :5].T + faces[:, 5]).max() < _ROUNDING:
-            return tuple(np.insert(face[:5], 2, face[5]) for face in faces)
+            return tuple(np.insert(faces[:, :5], 2, faces[:, 5], axis=1))
     raise InvalidInputError(
         f"the wrench cone of so thin a sole (friction {mu:g}) could not be computed. Use friction, "
         "CoP and torsion rows."
