@@ -9,7 +9,7 @@ from support.commands import copsense as command
 from support.results import small_log
 
 from copsense.errors import CopsenseError, InvalidInputError, LogReadError, UnknownNameError
-from copsense.logs import LogMap, WrenchSeries, apart, compare_log, read_log
+from copsense.logs import LogMap, WrenchSeries, apart, collecting, compare_log, read_log
 from copsense.logs.one_clock import gaps, ordered
 
 ROWS = 200
@@ -91,6 +91,67 @@ def test_a_dead_sensor_is_named_and_its_rows_left_out(tmp_path, icub):
     missing = np.isnan(log.wrenches[0].values[:, 2])
     assert missing.sum() == 80
     assert missing[60:140].all()
+
+
+def whole_sensor(rows=ROWS):
+    """The table with six numbers of l_sole, all of which change."""
+    noise = np.random.default_rng(1).normal(size=(6, rows))
+    names = [f"l_sole_{n}" for n in log_files.NUMBERS]
+    return columns(rows) | dict(zip(names, noise, strict=True))
+
+
+def test_a_component_that_is_stuck_alone_is_dead(tmp_path, icub):
+    table = whole_sensor()
+    table["l_sole_fz"][60:140] = 160.0
+    table["l_sole_mx"][:] = 0.3
+    table["l_sole_mz"][:] = 0.0  # not measured, as many sensors' moments about z
+    table["l_sole_fx"] = np.round(table["l_sole_fx"] * 0.2)  # coarse, and seldom changes
+    log = read_table(tmp_path / "log.csv", icub, table)
+    dead = [f.message for f in log.findings if f.kind == "dead sensor"]
+    assert len(dead) == 2
+    assert "force_z of the sensor 'l_sole' repeats one number at 80 rows, 0.6 to 1.39 s" in dead[0]
+    assert "have no moment_x" in dead[1]
+    missing = np.isnan(log.wrenches[0].values)
+    assert missing.sum(axis=0).tolist() == [80, 80, 80, 200, 80, 80]
+
+
+def test_infinite_forces_are_missing(tmp_path, icub):
+    table = columns()
+    table["l_sole_fz"][50:60] = np.inf
+    log = read_table(tmp_path / "log.csv", icub, table)
+    assert np.isnan(log.wrenches[0].values[50:60, 2]).all()
+    assert not np.isinf(log.wrenches[0].values).any()
+
+
+def test_words_among_numbers_are_named(tmp_path, icub):
+    table = columns()
+    table["l_knee"] = [*table["l_knee"][:-2], "err", "err"]
+    table["mode"] = ["walk"] * ROWS  # of no interest
+    log = read_table(tmp_path / "log.csv", icub, table)
+    assert any("2 entries of the column 'l_knee', such as 'err'" in note for note in log.notes)
+    table["time"] = [f"00:00:{t:05.2f}" for t in table["time"]]
+    message = error_of(lambda: read_table(tmp_path / "log.csv", icub, table), LogReadError)
+    assert "'time' of log.csv holds no number; it begins with '00:00:00.00'" in message
+
+
+def test_times_in_milliseconds(tmp_path, icub, made):
+    table = columns()
+    said = {"Time [ms]": 1e3 * table.pop("time")} | table
+    log = read_table(tmp_path / "log.csv", icub, said)
+    np.testing.assert_allclose(log.times[-1], (ROWS - 1) * 0.01)
+    unsaid = replace(made, times=1e3 * made.times)
+    (doubt,) = [f for f in compare_log(unsaid, icub).findings if f.kind == "clock"]
+    assert "50 s apart: the times may be in ms" in doubt.message
+
+
+def test_a_log_too_large_at_100_hertz_is_thinned_further(tmp_path, icub, monkeypatch):
+    monkeypatch.setattr(collecting, "LARGEST", 3 * ROWS)
+    log = read_table(tmp_path / "log.csv", icub, columns())
+    assert log.step == pytest.approx(0.1)
+    assert any("read at 10 Hz" in note for note in log.notes)
+    monkeypatch.setattr(collecting, "LARGEST", 3)
+    message = error_of(lambda: read_table(tmp_path / "log.csv", icub, columns()), LogReadError)
+    assert "cut the log" in message
 
 
 def test_a_sensor_dead_all_along_ends_the_comparison(made, icub):

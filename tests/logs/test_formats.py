@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import log_files
 
-from copsense.logs import LogMap, WrenchMap, compare_log, read_log
+from copsense.logs import JointsMap, LogMap, WrenchMap, compare_log, matlab_tree, read_log
 from copsense.logs.log_statics import wrench_cops
 from copsense.logs.opening import open_log_file
 from copsense.logs.recognition import recognise
@@ -63,6 +63,25 @@ def test_a_recording_of_our_own_comes_back(sway_file, data):
     np.testing.assert_array_equal(log.positions, data.q[:-1])
     np.testing.assert_allclose(cops_of(log, data.contacts)[1:], data.cop[1:-1], rtol=0, atol=1e-12)
     np.testing.assert_allclose(log.base[:, :3], data.base[:-1, :3], atol=1e-12)
+
+
+def test_structures_of_time_and_data_are_read(icub, data, tmp_path):
+    """What the message on an object of MATLAB's says to save."""
+    from scipy.io import savemat
+
+    said = matlab_tree._object("q", "an object of class timeseries")
+    assert "x = struct('time', q.Time, 'data', q.Data)" in said
+    signals = {"q": data.q, "left": data.w[:, 0], "right": data.w[:, 1]}
+    savemat(
+        tmp_path / "log.mat", {k: {"time": data.t[:, None], "data": v} for k, v in signals.items()}
+    )
+    wrenches = tuple(
+        WrenchMap(n, {"wrench": f"{k}.data"})
+        for n, k in zip(data.contacts, ("left", "right"), strict=True)
+    )
+    own = LogMap(JointsMap("q.data", names=data.joints), wrenches)
+    log = read_log(tmp_path / "log.mat", own, robot=icub.robot)
+    np.testing.assert_allclose(cops_of(log, data.contacts)[1:], data.cop[1:-1], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["ros1.bag", "ros2_mcap", "eurobench"])

@@ -127,6 +127,11 @@ def test_the_reproduction_takes_a_log_of_its_own(comparison, icub):
     found = identify_log(
         comparison.log, icub, ["joints", "length"], skip=0.0, postures=20, inertia=False
     )
+    # What was found of the log, and what the intervals have in them, comes with the parameters.
+    assert set(found.findings) <= set(comparison.findings)
+    assert found.notes[-1] == comparison.notes[-1]
+    assert "not in them" in found.notes[-1]
+    assert found.to_dict()["notes"] == list(found.notes)
     real = RealRobot(comparison, found, found)
     rows = real_rows(real)
     load = comparison.slopes["load"]

@@ -83,4 +83,6 @@ def identify(
         echo_json(found.to_dict())
         return
     click.echo(str(found))
-    echo_notes(subject.robot.notes)
+    for finding in found.findings:
+        click.echo(f"found: {finding.message}")
+    echo_notes((*subject.robot.notes, *found.notes))

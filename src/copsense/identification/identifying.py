@@ -18,6 +18,7 @@ from copsense.identification.fitting import Progress, cross_validated, fit_famil
 from copsense.identification.measurements import Measurements
 from copsense.identification.parameter_fit import ParameterFit
 from copsense.json_data import json_data
+from copsense.logs.finding import Finding
 
 _SAME = 0.02  # of an error: less is not a difference
 
@@ -35,6 +36,8 @@ class Identification(ShortRepr):
         errors: criterion or family -> cross-validated error, in shares of each channel's own
             spread, root mean square over the channels; smallest first.
         channel_errors: the same by channel (c,), each in its unit.
+        findings: of the log that was identified, what it lacks or gets wrong.
+        notes: how the log was read, and what the intervals have in them.
     """
 
     robot: str
@@ -44,6 +47,8 @@ class Identification(ShortRepr):
     fits: Mapping[str, ParameterFit]
     errors: Mapping[str, float]
     channel_errors: Mapping[str, Float[np.ndarray, " c"]]
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Own the mappings and the arrays in them."""
@@ -70,6 +75,8 @@ class Identification(ShortRepr):
                 for name, e in self.errors.items()
             },
             "best": list(self.best),
+            "findings": [finding.to_dict() for finding in self.findings],
+            "notes": list(self.notes),
         }
         return dict(json_data(data))
 
@@ -77,8 +84,10 @@ class Identification(ShortRepr):
         """The table of ``copsense identify``."""
         how = "with the recorded motion's inertia" if self.inertia else "at rest"
         shown = ", ".join(self.channels[:4]) + (", ..." if len(self.channels) > 4 else "")
+        many = len(self.channels)
+        channels = f"{many} channel" + "s" * (many != 1)
         lines = [
-            f"{self.robot}: {self.rows} rows {how}; {len(self.channels)} channels: {shown}",
+            f"{self.robot}: {self.rows} rows {how}; {channels}: {shown}",
             "cross-validated error, of each channel's own spread:",
         ]
         for name, error in self.errors.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from copsense.identification.identifying import Identification, identify
 from copsense.identification.measurements import Measurements
 from copsense.logs.aligned_log import AlignedLog, align_log
 from copsense.logs.comparing import SKIPPED
-from copsense.logs.encoder_bias import biased_records, encoder_error, some_rows
+from copsense.logs.encoder_bias import biased_records, encoder_error, interval_note, some_rows
 from copsense.logs.log import Log
 from copsense.logs.log_motion import LogMotion
 from copsense.robot import Robot
@@ -54,16 +55,16 @@ def identify_log(
     Raises:
         CopsenseError: as `compare_log` and `identify`.
     """
-    measured = log_measurements(
-        log,
-        robot,
-        contacts=contacts,
-        inertia=inertia,
-        skip=skip,
-        postures=postures,
-        encoders=encoders,
+    encoders = encoder_error(encoders)
+    aligned = _aligned(log, robot, contacts)
+    measured = _measurements(
+        log, aligned, inertia=inertia, skip=skip, postures=postures, encoders=encoders
     )
-    return identify(measured, families, progress=progress)
+    return replace(
+        identify(measured, families, progress=progress),
+        findings=aligned.findings,
+        notes=(*aligned.notes, interval_note(encoders)),
+    )
 
 
 def log_measurements(
@@ -90,11 +91,35 @@ def log_measurements(
     Raises:
         CopsenseError: as `compare_log`, or nothing was measured that moves.
     """
+    return _measurements(
+        log,
+        _aligned(log, robot, contacts),
+        inertia=inertia,
+        skip=skip,
+        postures=postures,
+        encoders=encoders,
+    )
+
+
+def _aligned(
+    log: Log, robot: str | Path | Robot | Stance, contacts: Sequence[str | Contact] | None
+) -> AlignedLog:
     check_type(log, Log, "a log", "Give what copsense.logs.read_log returns.")
+    return align_log(log, robot, contacts=contacts, postures=len(log.times))
+
+
+def _measurements(
+    log: Log,
+    aligned: AlignedLog,
+    *,
+    inertia: bool,
+    skip: float,
+    postures: int,
+    encoders: float,
+) -> Measurements:
     skip = finite_number(skip, "the beginning of a log to skip [s]")
     encoders = encoder_error(encoders)
     postures = whole_number(postures, "the number of postures of a log", least=20)
-    aligned = align_log(log, robot, contacts=contacts, postures=len(log.times))
     late = log.times[aligned.rows] >= skip
     if not late.any():
         raise InvalidInputError(

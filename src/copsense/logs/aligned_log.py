@@ -18,7 +18,13 @@ from copsense.errors import InvalidInputError
 from copsense.logs.finding import Finding
 from copsense.logs.ground_wrenches import ground_wrenches
 from copsense.logs.log import Log
-from copsense.logs.log_audit import audit_feet, audit_forces, check_encoders, check_joints
+from copsense.logs.log_audit import (
+    audit_feet,
+    audit_forces,
+    check_clock,
+    check_encoders,
+    check_joints,
+)
 from copsense.logs.log_motion import (
     LogMotion,
     Stand,
@@ -85,7 +91,7 @@ def align_log(
     """
     model, known_contacts = log_robot(robot)
     feet = _contacts(log, model, known_contacts, contacts)
-    findings = [*log.findings, *check_joints(log, model)]
+    findings = [*log.findings, *check_clock(log), *check_joints(log, model)]
     whole, model = model, model.keeping(log.joint_names)
     notes = [*log.notes, *_locked(whole, model, feet)]
     findings += check_encoders(log, model, feet)

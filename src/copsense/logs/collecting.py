@@ -44,15 +44,18 @@ def collect(
         if held > LARGEST:
             raise TooLargeError(
                 f"{file.path.name} holds more than {LARGEST // 1_000_000} million numbers of "
-                "these signals. Give a rate, such as 100 Hz: samples are averaged while they are "
-                "read."
+                "these signals. Give a lower rate (rate=, --rate), or cut the log: samples are "
+                "averaged while they are read."
             )
     found: dict[str, Float[np.ndarray, "N k"]] = {}
     for thinner in bins.values():
         found |= thinner.arrays()
     empty = [key for key in keys if key not in found or not len(found[key])]
     if empty:
-        raise LogReadError(f"{file.path} has no row of {', '.join(empty)}. Map other signals.")
+        more = f" and {len(empty) - 5} more signals" if len(empty) > 5 else ""
+        raise LogReadError(
+            f"{file.path} has no row of {', '.join(empty[:5])}{more}. Map other signals."
+        )
     return found
 
 

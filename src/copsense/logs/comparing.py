@@ -13,7 +13,7 @@ from copsense.arrays import check_type, finite_number, whole_number
 from copsense.contact import Contact
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.logs.aligned_log import POSTURES, AlignedLog, align_log
-from copsense.logs.encoder_bias import biased_records, encoder_error, some_rows
+from copsense.logs.encoder_bias import biased_records, encoder_error, interval_note, some_rows
 from copsense.logs.finding import Finding
 from copsense.logs.log import Log
 from copsense.logs.log_audit import audit_com, audit_middle, audit_slope
@@ -93,13 +93,7 @@ def compare_log(
         f"joints smoothed by a Savitzky-Golay filter of {window:.3g} s (cubic); accelerations are "
         "its derivative of the velocity"
     )
-    notes.append(
-        f"intervals with a constant error of each encoder of {np.degrees(encoders):.3g} deg "
-        "(standard deviation, independent)"
-        if encoders
-        else "intervals are of noise; constant errors of the encoders are not in them "
-        "(encoders=, --encoders)"
-    )
+    notes.append(interval_note(encoders))
     return LogComparison(
         log,
         model.name,

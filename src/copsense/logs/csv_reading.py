@@ -63,7 +63,8 @@ class CsvFile(LogFile):
         import pandas as pd
 
         wanted = list(dict.fromkeys(keys))
-        text = dict.fromkeys(wanted, 0)
+        text, rows = dict.fromkeys(wanted, 0), 0
+        examples: dict[str, str] = {}
         with self.path.open("rb") as file:
             at = 0
             with reading(self.path, "table"):
@@ -83,18 +84,28 @@ class CsvFile(LogFile):
                     block = {}
                     for key in wanted:
                         column = part[key]
-                        if column.dtype == object or not np.issubdtype(column.dtype, np.number):
+                        if not pd.api.types.is_numeric_dtype(column):
                             numbers = pd.to_numeric(column, errors="coerce")
-                            text[key] += int((numbers.isna() & column.notna()).sum())
+                            words = column[numbers.isna() & column.notna()]
+                            if len(words):
+                                text[key] += len(words)
+                                examples.setdefault(key, str(words.iloc[0])[:40])
                             column = numbers
                         block[key] = np.asarray(column, float)[:, None]
+                    rows += len(part)
                     yield block
                     advance(file.tell() - at)
                     at = file.tell()
         for key, count in text.items():
+            if count == rows and rows:
+                raise LogReadError(
+                    f"the column {key!r} of {self.path.name} holds no number; it begins with "
+                    f"{examples[key]!r}. Write numbers, with a decimal point; times in seconds."
+                )
             if count:
                 self.notes.append(
-                    f"{count} entries of the column {key!r} are not numbers and count as missing."
+                    f"{count} entries of the column {key!r}, such as {examples[key]!r}, are not "
+                    "numbers and count as missing."
                 )
 
 

@@ -43,6 +43,19 @@ def encoder_error(value: object) -> float:
     return found
 
 
+def interval_note(bias: float) -> str:
+    """What intervals have in them, with encoders of a standard deviation [rad], or without."""
+    if not bias:
+        return (
+            "intervals are of noise; constant errors of the encoders are not in them "
+            "(encoders=, --encoders)"
+        )
+    return (
+        f"intervals with a constant error of each encoder of {np.degrees(bias):.3g} deg (standard "
+        "deviation, independent)"
+    )
+
+
 def some_rows(rows: Int[np.ndarray, " M"], most: int = ROWS) -> Int[np.ndarray, " K"]:
     """Places in `rows`, evenly chosen."""
     return np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(int))

@@ -23,6 +23,8 @@ _TILT = np.radians(1.0)  # of a foot against the first
 _BEYOND = 1.5  # rad beyond its limits, or a whole turn, that say a joint is in other units
 _SHARE = 0.02  # of the load, with the CoM in the middle
 _COM = 5e-3  # m between the total CoP and the CoM, on average
+_FAR = 0.3  # m at which that is no offset any more
+_SLOW = 1.0  # s from row to row, which no robot records at
 
 
 def check_joints(log: Log, robot: Robot) -> list[Finding]:
@@ -69,6 +71,20 @@ def check_joints(log: Log, robot: Robot) -> list[Finding]:
             "its unit, sign and offset.",
         )
         for k in np.flatnonzero(beyond > 0.05)
+    ]
+
+
+def check_clock(log: Log) -> list[Finding]:
+    """Whether the times may be in another unit than seconds."""
+    if log.step < _SLOW:
+        return []
+    return [
+        Finding(
+            "clock",
+            "the log",
+            f"its rows are {log.step:.4g} s apart: the times may be in ms, us or ns. Give unit "
+            "under [time] of the mapping; what is said of the motion's inertia is wrong otherwise.",
+        )
     ]
 
 
@@ -260,8 +276,12 @@ def audit_com(com: Float[np.ndarray, "M 2"], cop: Float[np.ndarray, "M 2"]) -> l
             "com",
             "the centre of mass",
             f"the total centre of pressure is ({middle[0] * 1e3:+.1f}, {middle[1] * 1e3:+.1f}) mm "
-            "from the projected centre of mass on average (x, y): masses of the model, offsets of "
-            "encoders or of moments.",
+            "from the projected centre of mass on average (x, y): "
+            + (
+                "moments in other units (N mm), or about another point?"
+                if np.abs(middle).max() > _FAR
+                else "masses of the model, offsets of encoders or of moments."
+            ),
         )
     ]
 

@@ -198,7 +198,7 @@ def smooth_motion(
 
     if len(q) < window + 2:
         raise InvalidInputError(
-            f"the log has {len(q)} rows, fewer than the {window} that smoothing takes. Give a "
+            f"the log has {len(q)} rows, fewer than the {window + 2} that smoothing takes. Give a "
             "longer log."
         )
     model = robot.model

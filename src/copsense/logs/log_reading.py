@@ -24,6 +24,7 @@ from copsense.logs.signals import Signals
 from copsense.robot import Robot
 
 _DEAD = 0.5  # s for which a force sensor repeats one number until it counts as dead
+_LIVELY = 0.5  # share of the steps at which a number that is measured changes
 
 
 def read_log(
@@ -45,7 +46,7 @@ def read_log(
         robot: whose log it is; tells columns by the names of its joints, and which joints slide.
         contacts: names of the contacts that the force sensors serve.
         rate: rows a second, each the mean of the samples around it [Hz]; default all rows, or 100
-            Hz where these are too many for memory.
+            or 10 Hz where these are too many for memory.
         advance: called with the bytes read, for a progress bar.
 
     Raises:
@@ -212,6 +213,7 @@ class _Reading:
         for component, column in columns.items():
             read = signals.at(column.key, times, later)[:, column.index]
             values[:, component] = given.sign * (read - given.offset[component])
+        values[np.isinf(values)] = np.nan
         if clock is not main:
             self.findings += gaps(clock, given.name)
         measured = np.isfinite(values).any(axis=0)
@@ -229,6 +231,20 @@ class _Reading:
         if found is not None:
             self.findings.append(found)
             values[dead] = np.nan
+        for lone, stuck in _stuck(values, own).items():
+            of_all = lone == "force_z" or given.kind == "leg"
+            found = dated(
+                "dead sensor",
+                given.name,
+                f"{lone} of the sensor {given.name!r} repeats one number at {{rows}} rows, "
+                "{where}, while its other numbers change: it was dead, and these rows "
+                + ("count as missing." if of_all else f"have no {lone}."),
+                stuck,
+                own,
+            )
+            assert found is not None
+            self.findings.append(found)
+            values[stuck, slice(None) if of_all else COMPONENTS.index(lone)] = np.nan
         return WrenchSeries(given.name, given.contact, given.frame, given.kind, values)
 
     def _base_rows(self, times: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N 7"]:
@@ -248,6 +264,27 @@ class _Reading:
         )
         if found is not None:
             self.findings.append(found)
+
+
+def _stuck(values: Float[np.ndarray, "N 6"], times: np.ndarray) -> dict[str, np.ndarray]:
+    """Component -> rows in which it alone repeats one number for `_DEAD` and longer.
+
+    A component that seldom changes elsewhere has coarse steps, and one that is zero all along was
+    not measured: neither is dead.
+    """
+    measured = [i for i in range(6) if np.nan_to_num(values[:, i]).any()]
+    changes = np.diff(values, axis=0) != 0
+    found = {}
+    for i in measured:
+        rows = _repeating(values[:, [i]], times)
+        others = [k for k in measured if k != i]
+        if not rows.any() or not others:
+            continue
+        meanwhile = changes[rows[1:]][:, others].any(axis=1)
+        elsewhere = changes[~rows[1:], i]
+        if meanwhile.mean() > _LIVELY and (not elsewhere.size or elsewhere.mean() > _LIVELY):
+            found[COMPONENTS[i]] = rows
+    return found
 
 
 def _repeating(values: np.ndarray, times: np.ndarray) -> np.ndarray:

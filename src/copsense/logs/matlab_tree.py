@@ -182,6 +182,7 @@ def _object_strings(file: Any) -> list[list[str]]:
 
 def _object(key: str, what: str) -> str:
     return (
-        f"{key} is {what} that only MATLAB reads, and was left out. Where it holds data that is "
-        "needed, save its numbers as arrays: x.Time, x.Data."
+        f"{key} is {what} that only MATLAB reads, and was left out. A timeseries is saved for "
+        f"others by: x = struct('time', {key}.Time, 'data', {key}.Data); "
+        "save('log.mat', 'x', '-v7.3')."
     )

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable, Sequence
 
 from copsense.errors import InvalidInputError
+from copsense.logs.c3d_reading import C3dFile
 from copsense.logs.channel import Channel, LogFile, Meaning
-from copsense.logs.log_map import COMPONENTS, BaseMap, JointsMap, LogMap, WrenchMap
+from copsense.logs.log_map import COMPONENTS, TIME_UNITS, BaseMap, JointsMap, LogMap, WrenchMap
 from copsense.logs.matlab_reading import MatlabFile
 from copsense.logs.recording_reading import RecordingFile
 from copsense.robot import Robot
@@ -49,6 +50,11 @@ def recognise(file: LogFile, robot: Robot | None, contacts: Sequence[str] = ()) 
     found = _by_names(file, robot, contacts)
     if found is not None:
         return found
+    if isinstance(file, C3dFile):
+        raise InvalidInputError(
+            f"{file.path.name} holds force plates and no joints. Give the robot's own log, and "
+            f'in its mapping file = "{file.path.name}" under [[wrenches]] (docs/logs.md).'
+        )
     held = ", ".join(
         f"{c.key} ({c.width})" if c.width > 1 else c.key for c in list(file.channels.values())[:30]
     )
@@ -176,7 +182,7 @@ def _by_names(file: LogFile, robot: Robot | None, contacts: Sequence[str]) -> Lo
     positions = _joints_in(keys, _PATTERNS, robot)
     if not positions:
         return None
-    time = next((k for k in file.channels if k.lower() in _TIMES), "")
+    time, unit = _time_in(file)
     if not time and not any(c.clock for c in file.channels.values()):
         raise InvalidInputError(
             f"{file.path.name} has no column that looks like its time ({', '.join(_TIMES)}). Give "
@@ -197,7 +203,6 @@ def _by_names(file: LogFile, robot: Robot | None, contacts: Sequence[str]) -> Lo
     place = tuple(f"base_{a}" for a in "xyz")
     turn = tuple(f"base_q{a}" for a in "xyzw")
     base = BaseMap(place, turn) if keys >= {*place, *turn} else None
-    unit = file.channels[time].unit_time if time else "s"
     return LogMap(
         JointsMap(
             positions,
@@ -210,6 +215,16 @@ def _by_names(file: LogFile, robot: Robot | None, contacts: Sequence[str]) -> Lo
         unit,
         origin=f"the headings of {file.path.name}",
     )
+
+
+def _time_in(file: LogFile) -> tuple[str, str]:
+    """Heading and unit of a table's clock, ``time`` or such as ``Time [ms]``; or nothing."""
+    for key, channel in file.channels.items():
+        name, _, rest = re.sub(r"[(\[]", "[", key.lower()).partition("[")
+        unit = rest.rstrip(" )]") if rest else channel.unit_time
+        if name.strip() in _TIMES and unit in TIME_UNITS:
+            return key, unit
+    return "", "s"
 
 
 def _joints_in(keys: set[str], patterns: Sequence[str], robot: Robot) -> dict[str, str]:

@@ -16,7 +16,7 @@ from copsense.logs.log_map import TIME_UNITS
 from copsense.logs.one_clock import Clock, on_clock, ordered
 from copsense.logs.selection import Column, one_column
 
-_THINNED = 100.0  # Hz that a log is thinned to where it is too large for memory
+_THINNED = (100.0, 10.0)  # Hz, one after the other, where a log is too large for memory
 _ROWS_OF_FILE = ""  # the clock of a file that has none
 
 
@@ -49,8 +49,8 @@ class Signals:
         """Read what is wanted.
 
         Args:
-            rate: rows a second, each the mean of the samples around it; None for all, or 100 Hz
-                where these are too many for memory.
+            rate: rows a second, each the mean of the samples around it; None for all, or 100 or
+                10 Hz where these are too many for memory.
             advance: called with the bytes read.
         """
         if rate is not None and _ROWS_OF_FILE in self._clock_of.values():
@@ -98,20 +98,27 @@ class Signals:
     def _collected(
         self, rate: float | None, advance: Progress
     ) -> dict[str, Float[np.ndarray, "N k"]]:
-        rates = {}
-        if rate is not None:
-            rates = {c: rate * self._second(c) for c in set(self._clock_of.values()) if c}
-        try:
-            return collect(self.file, sorted(self._clock_of), self._clock_of, rates, advance)
-        except TooLargeError:
-            if rate is not None or _ROWS_OF_FILE in self._clock_of.values():
-                raise
-        # Out of the clause, whose error would keep what was read so far in memory.
-        self.notes.append(
-            f"too large for memory: read at {_THINNED:g} Hz, each row the mean of the samples "
-            "around it"
-        )
-        return self._collected(_THINNED, advance)
+        tries: tuple[float | None, ...] = (None, *_THINNED) if rate is None else (rate,)
+        if _ROWS_OF_FILE in self._clock_of.values():
+            tries = tries[:1]
+        for hertz in tries:
+            rates = {}
+            if hertz is not None:
+                rates = {c: hertz * self._second(c) for c in set(self._clock_of.values()) if c}
+            # The error is let go at once: it would keep what was read so far in memory.
+            try:
+                found = collect(self.file, sorted(self._clock_of), self._clock_of, rates, advance)
+            except TooLargeError:
+                if hertz == tries[-1]:
+                    raise
+                continue
+            if hertz != tries[0]:
+                self.notes.append(
+                    f"too large for memory: read at {hertz:g} Hz, each row the mean of the samples "
+                    "around it"
+                )
+            return found
+        raise AssertionError  # the last try returns or raises
 
     def _second(self, clock: str) -> float:
         """A unit of a clock in seconds."""

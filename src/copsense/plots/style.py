@@ -32,7 +32,7 @@ _KNOWN = {
 _OTHERS = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#8C6D31", "#000000")
 _STYLES: tuple[Any, ...] = ("-", (0, (4.5, 1.8)), (0, (1.2, 1.4)), (0, (5, 1.4, 1.2, 1.4)))
 
-_LETTERS, _HANDLE = 17.0, 6  # letters per inch of a legend; letters that a handle takes
+_LETTERS, _HANDLE = 15.0, 6  # letters per inch of a legend; letters that a handle takes
 
 _RC = {
     "font.family": "DejaVu Sans",
