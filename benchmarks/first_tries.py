@@ -50,6 +50,7 @@ COMMANDS = {
 HELD = {
     "sweep": "--com-x=-2mm:2mm:5",
     "balance": "--reference hold",
+    "design": "--family mix --grid 3 --com-x=-2mm:2mm:5",
     "map": "--over com_x=-2mm:2mm:5 --output {folder}/map.zarr",
 }
 SECONDS = 300

@@ -1,6 +1,11 @@
 """``copsense design`` answers."""
 
+import pytest
 from support.commands import copsense
+
+from copsense import Limits, load_stance
+from copsense.design import design_criterion
+from copsense.path import com_sweep
 
 LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"
 
@@ -36,3 +41,15 @@ def test_a_design_that_gains_nothing_or_meets_no_limit_says_so():
     assert answer.code == 0
     assert "keep minimum-wrench" in answer.out
     assert "Sweep farther" in answer.err
+
+
+def test_a_design_along_another_axis_of_the_com():
+    arguments = ("--family", "length", "--grid", 3, "--com-x=-0.1:0.1:9")
+    answer = copsense("design", "icub", *arguments, "--json").json
+    stance = load_stance("icub")
+    path = com_sweep(stance, "com_x", -0.1, 0.1, 9, held={})
+    same = design_criterion(path, Limits(), "length", grid=3)
+    assert answer["best"]["travel"] == pytest.approx(same.score.travel, abs=1e-9)
+    assert 0.02 < same.score.travel < 0.1
+    both = ("--com-x=-0.1:0.1:9", "--com-y=-0.1:0.1:9")
+    assert "along one axis" in copsense("design", "icub", *both).error

@@ -254,7 +254,9 @@ def test_a_sweep_holds_what_has_one_value():
     assert "say what to sweep" in copsense("sweep", "icub", *two).error
     rows = ("--configurations", "rows.csv", "--com-y", "0.1")
     assert "and so does --com-y" in copsense("sweep", "icub", *rows).error
-    assert "a design sweeps the CoM sideways" in copsense("design", "icub", "--com-y", "0").error
+    assert (
+        "a design sweeps the CoM along one axis" in copsense("design", "icub", "--com-y", "0").error
+    )
 
 
 def test_the_line_of_an_inspection_keeps_contacts_and_drives(robot, plain):

@@ -71,30 +71,34 @@ def design(
 ) -> None:
     """Design the weights of a criterion for ROBOT, and say what they gain over the paper's two.
 
-    The CoM is swept sideways from the posture (--com-y, default -0.09:0.09:37, its middle being
-    where the travel begins); each candidate is judged by how far it goes before
-    its own wrenches, unclipped, meet a limit.
+    The CoM is swept from the posture, sideways unless another axis is given (default --com-y
+    -0.09:0.09:37, its middle being where the travel begins); each candidate is judged by how far
+    it goes before its own wrenches, unclipped, meet a limit.
     """
     from copsense.design import design_criterion, design_size, family_named, usual_grid
     from copsense.files import check_output
     from copsense.limits import Limits
-    from copsense.path import com_sweep
+    from copsense.path import COM_COORDINATES, com_sweep
 
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=force)
     within = read_limits(limits) or Limits()
-    course = read_course(com_x, com_y or _USUAL, com_z, joints)
-    if [*course.swept] != ["com_y"]:
+    course = read_course(com_x, com_y, com_z, joints)
+    if not course.swept and com_y is None:
+        course = read_course(com_x, _USUAL, com_z, joints)
+    swept = [*course.swept]
+    if len(swept) != 1 or swept[0] not in COM_COORDINATES:
         raise InvalidInputError(
-            "a design sweeps the CoM sideways: give --com-y START:STOP:COUNT, and --com-x, --com-z "
-            "and --joint single values, which hold."
+            "a design sweeps the CoM along one axis: give one of --com-x, --com-y and --com-z as "
+            "START:STOP:COUNT, and the others and --joint single values, which hold."
         )
+    (moved,) = swept
     stance = read_stance(robot, **course.places, **options)
-    start, stop, count = course.range_of("com_y", stance.robot)
+    start, stop, count = course.range_of(moved, stance.robot)
     chosen = family_named(stance, family)
     with progress_bar(max(count, 0), "postures") as update:
         held = course.held(stance.robot)
-        path = com_sweep(stance, "com_y", start, stop, count, held=held, progress=update)
+        path = com_sweep(stance, moved, start, stop, count, held=held, progress=update)
     values = usual_grid(chosen) if grid is None else grid
     with progress_bar(design_size(chosen, values), "candidates", "criterion") as update:
         found = design_criterion(
@@ -138,7 +142,7 @@ def _print(found: Design) -> None:
     if NO_LIMIT in (found.score.first_limit, *(s.first_limit for s in found.baselines)):
         click.echo(
             "note: the path ends before a limit is met, so travels of its length cannot be "
-            "compared. Sweep farther: --com-y START:STOP:COUNT.",
+            "compared. Sweep farther.",
             err=True,
         )
     click.echo("\nPareto set (no other is better in both):")
