@@ -8,6 +8,7 @@ from support import log_files
 from support.commands import copsense as command
 from support.results import small_log
 
+import copsense
 from copsense.errors import CopsenseError, InvalidInputError, LogReadError, UnknownNameError
 from copsense.logs import LogMap, WrenchSeries, apart, collecting, compare_log, read_log
 from copsense.logs.one_clock import gaps, ordered
@@ -152,6 +153,17 @@ def test_a_log_too_large_at_100_hertz_is_thinned_further(tmp_path, icub, monkeyp
     monkeypatch.setattr(collecting, "LARGEST", 3)
     message = error_of(lambda: read_table(tmp_path / "log.csv", icub, columns()), LogReadError)
     assert "cut the log" in message
+
+
+def test_a_long_log_keeps_the_frequency_of_its_sway(made, icub):
+    """Rows evenly chosen from all of it, 10.05 s apart, would show a sway of 20 s."""
+    times = np.arange(40 * 101) * 0.05
+    sensors = tuple(replace(w, values=np.tile(w.values, (101, 1))) for w in made.wrenches)
+    positions = np.tile(made.positions, (101, 1))
+    long = replace(made, times=times, positions=positions, torques=None, wrenches=sensors)
+    found = compare_log(long, icub, [copsense.minimum_torque()], postures=20, skip=0.0)
+    assert found.sway.frequency == pytest.approx(1.0, abs=0.1)
+    assert any("rows farther apart would not show a sway of 1 Hz" in n for n in found.notes)
 
 
 def test_a_sensor_dead_all_along_ends_the_comparison(made, icub):

@@ -41,6 +41,8 @@ from copsense.robots import PRESETS, load_robot, load_stance
 from copsense.stance import Stance
 
 POSTURES = 5000  # that are evaluated at most
+_LOOK, _LOOKED = 0.05, 4000  # s from row to row of a look at the sway, and its rows
+_OF_SWAY = 0.125  # of a sway's period, by which rows that are evaluated lie apart at most
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,11 +109,11 @@ def align_log(
         stand = partial(_on_feet, model, feet)
     else:
         raise InvalidInputError(f"the base is {base!r}. Give 'feet' or 'recorded'.")
-    motion, _ = _motion(log, model, stand, known)
+    motion, frequency = _motion(log, model, stand, known)
     wrenches = ground_wrenches(log, model, feet, motion, base == "recorded")
     findings += audit_forces(log, model, feet, wrenches[:, :, 2])
     findings += audit_feet(log, model, feet, motion)
-    rows = _compared(log, model, feet, motion, wrenches, postures, notes)
+    rows = _compared(log, model, feet, motion, wrenches, postures, frequency, notes)
     torques = _torques(log, model, rows)
     return AlignedLog(
         model, tuple(feet), base, motion, rows, wrenches, torques, tuple(findings), tuple(notes)
@@ -202,18 +204,21 @@ def _motion(
     stand: Stand,
     known: Bool[np.ndarray, " N"],
 ) -> tuple[LogMotion, float]:
-    """The motion, smoothed as its sway allows, and the filter's length [s]."""
+    """The motion, smoothed as its sway allows, and the sway's frequency [Hz]; NaN without."""
     rows = joint_rows(log, robot)
-    # A look at the sway, without smoothing, says how much smoothing it bears.
-    every = max(1, len(rows) // 1000)
-    com = com_rows(robot, stand(rows[::every].copy(), 1, every))
+    # A look at the sway, without smoothing, says how much smoothing it bears: at the middle of a
+    # long log, for rows too far apart show a sway that is slower than it is.
+    every = max(1, min(len(rows) // 1000, int(_LOOK / log.step)))
+    standing = stand(rows[::every].copy(), 1, every)
+    middle = slice(begin := max(0, (len(standing) - _LOOKED) // 2), begin + _LOOKED)
+    com = com_rows(robot, standing[middle])
     frequency = math.nan
     if np.ptp(com[:, :2], axis=0).max() > STILL and len(com) >= LEAST:
         axis = int(np.argmax(np.ptp(com[:, :2], axis=0)))
-        frequency = find_sway(log.times[::every], com[:, axis]).frequency
+        frequency = find_sway(log.times[::every][middle], com[:, axis]).frequency
     samples = min(smoothing_window(frequency, log.step), max(5, (len(rows) - 3) // 2 * 2 + 1))
     motion = smooth_motion(robot, rows, samples, log.step, stand, known)
-    return motion, motion.window
+    return motion, frequency
 
 
 def _compared(
@@ -223,6 +228,7 @@ def _compared(
     motion: LogMotion,
     wrenches: Float[np.ndarray, "N nc 6"],
     postures: int,
+    frequency: float,
     notes: list[str],
 ) -> Int[np.ndarray, " M"]:
     """Rows on which all feet are loaded and everything needed was measured.
@@ -244,8 +250,19 @@ def _compared(
             "check signs and sensors."
         )
     if len(rows) > postures:
-        every = -(-len(rows) // postures)
-        notes.append(f"every {every}th of {len(rows)} rows was evaluated")
+        every, whole = -(-len(rows) // postures), len(rows)
+        finest = every if math.isnan(frequency) else max(1, int(_OF_SWAY / frequency / log.step))
+        if every > finest:
+            every, rows = finest, rows[: postures * finest]
+        notes.append(
+            f"every {every}th of {len(rows)} rows was evaluated"
+            + (
+                f", the first of {whole}: rows farther apart would not show a sway of "
+                f"{frequency:.3g} Hz. More are evaluated with postures= (--postures)"
+                if len(rows) < whole
+                else ""
+            )
+        )
         rows = rows[::every]
     return rows
 

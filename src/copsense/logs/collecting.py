@@ -10,7 +10,7 @@ from jaxtyping import Float
 from copsense.errors import LogReadError
 from copsense.logs.channel import LogFile, Progress
 
-LARGEST = 8_000_000  # numbers that are kept in memory: 64 MB
+LARGEST = 6_000_000  # numbers that are kept in memory: 48 MB, of which there will be copies
 
 
 def collect(
@@ -100,7 +100,8 @@ class _Bins:
         if self._left and not self._parts:
             self._keep(_means(self._left, np.zeros(0, int)))
             self._left = {}
-        return {key: np.concatenate(parts) for key, parts in self._parts.items()}
+        # One after the other, so that parts and wholes are not both held.
+        return {key: np.concatenate(self._parts.pop(key)) for key in list(self._parts)}
 
     def _keep(self, block: Mapping[str, np.ndarray]) -> int:
         for key, rows in block.items():
