@@ -209,9 +209,9 @@ def _motion(
     # A look at the sway, without smoothing, says how much smoothing it bears: at the middle of a
     # long log, for rows too far apart show a sway that is slower than it is.
     every = max(1, min(len(rows) // 1000, int(_LOOK / log.step)))
-    standing = stand(rows[::every].copy(), 1, every)
-    middle = slice(begin := max(0, (len(standing) - _LOOKED) // 2), begin + _LOOKED)
-    com = com_rows(robot, standing[middle])
+    begin = max(0, (len(rows[::every]) - _LOOKED) // 2)
+    middle = slice(begin, begin + _LOOKED)
+    com = com_rows(robot, stand(rows[::every].copy(), 1, every)[middle])
     frequency = math.nan
     if np.ptp(com[:, :2], axis=0).max() > STILL and len(com) >= LEAST:
         axis = int(np.argmax(np.ptp(com[:, :2], axis=0)))
