@@ -13,7 +13,8 @@ from support.commands import copsense as run
 from support.walkers import BIPED, FULL, bent, walker
 
 import copsense
-from copsense import Contact, Limits, Load, Plane, minimum_wrench, rectangle
+from copsense import Contact, Drives, Limits, Load, Plane, minimum_wrench, rectangle
+from copsense.drives import Spring
 from copsense.errors import CopsenseError
 from copsense.loads import SpringLoad
 from copsense.magnitudes import MagnitudeWarning
@@ -114,10 +115,35 @@ def test_what_may_be_meant_and_hardly_is_is_done_and_doubted(stance):
         (lambda: stance.with_loads([Load("trunk", point=(0, 0, 100))]), "100 mm are 0.1 m"),
         (lambda: stance.with_loads([SpringLoad("trunk", (300, 0, 0), (50, 0, 0))]), "its anchor"),
         (lambda: minimum_wrench(70), "70 mm are 0.07 m"),
+        (lambda: Contact("l_foot", friction=60), "'l_foot': friction is 60.* 60 % are 0.6"),
+        (lambda: Limits(friction=60), "limit friction is 60.* 60 % are 0.6"),
+        (lambda: Limits(friction={"l_foot": 80}), "'l_foot' is 80.* 80 % are 0.8"),
     ]
     for call, said in hardly:
         with pytest.warns(MagnitudeWarning, match=said):
             assert call() is not None
+
+
+def test_drives_of_another_unit_and_soles_in_each_other_are_doubted(stance):
+    hardly = [
+        (lambda: standing(drives=Drives(held={"l_knee": 8000.0})), "8000 Nmm are 8 Nm"),
+        (lambda: standing(drives=Drives(springs={"l_knee": Spring(9, 40)})), "40 degrees are 0.69"),
+        (lambda: standing(width=0.04), "'l_foot' and 'r_foot' lie in each other by 50 %"),
+    ]
+    for call, said in hardly:
+        with pytest.warns(ImplausibleStanceWarning, match=said):
+            call()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        standing(drives=Drives(held={"l_knee": 8.0}, springs={"r_knee": Spring(9, 7.0)}))
+        standing(width=0.08)  # they touch
+
+
+def test_a_whole_configuration_in_degrees_is_rejected(stance):
+    q = np.array(stance.q)
+    q[7:] = np.degrees(q[7:])
+    with pytest.raises(CopsenseError, match="Angles are in radians"):
+        stance.at(q)
 
 
 def test_a_joint_without_limits_may_turn_on_and_is_doubted():

@@ -81,6 +81,7 @@ CALLS = {
     "lateral_sweep(s.robot, 0, 0.1, 3)": "Make one with copsense.load_stance(...)",
     "sweep(s, [mt])": NO_PATH,
     "sweep('icub', [mt])": NO_PATH,
+    "sweep(p, [copsense.minimum_torque])": "makes a criterion, and none itself. Call it",
     "PathScan(s, mt)": NO_PATH,
     "PathScan(None, mt)": NO_PATH,
     "design_criterion(s, L, 'length')": NO_PATH,

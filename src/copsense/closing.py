@@ -9,9 +9,11 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.closures import RANK, Closures
+from copsense.errors import OpenLoopError
 from copsense.robot import Robot
 
 _CLOSED = 1e-11  # m, rad
+_SHUT = 1e-6  # m, rad: what is open by less, posture solving closes
 _STEP = 0.3  # rad, m: longer steps are shortened
 _ITERATIONS = 100
 
@@ -42,6 +44,26 @@ def close(
     loose[[robot.velocity_index(j) for j in wanted & set(robot.dof_names)]] = 0.0
     found, gap = _newton(robot, q, loose)
     return found if gap < _CLOSED else min((found, gap), _newton(robot, q, free), key=_gap)[0]
+
+
+def check_closable(robot: Robot, q: Float[np.ndarray, " nq"]) -> None:
+    """Reject a configuration that `close` could not close.
+
+    Raises:
+        OpenLoopError: a loop or coupling is open there.
+    """
+    if not (robot.drives.couplings or robot.drives.loops):
+        return
+    closures = Closures(robot, q)
+    error = np.abs(closures.error)
+    worst = int(error.argmax())
+    if error[worst] > _SHUT:
+        raise OpenLoopError(
+            f"{closures.names[worst]} of robot {robot.name!r} cannot be closed: the joints leave "
+            f"{error[worst]:.3g} (m or rad) open, starting from this posture. Give a posture "
+            "nearer to where it is closed (posture=, --posture JOINT=POSITION), other points of "
+            "the two frames (FRAME@X:Y:Z), or a kind that holds less (ball, pin, weld)."
+        )
 
 
 def _gap(found: tuple[np.ndarray, float]) -> float:

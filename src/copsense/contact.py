@@ -14,7 +14,7 @@ from jaxtyping import Float
 from copsense.arrays import check_type, finite_array, finite_number, read_only
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
-from copsense.magnitudes import LONGEST_SOLE, check_angle, check_length, in_radians
+from copsense.magnitudes import LONGEST_SOLE, check_angle, check_length, doubt_friction, in_radians
 from copsense.polygon import Polygon
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
@@ -163,6 +163,8 @@ class Contact(ShortRepr):
                 number = finite_number(value, told)
                 _require(number >= 0, f"{told} is {value}. Give a non-negative number, or None")
                 object.__setattr__(self, what, number)
+        if self.friction is not None:
+            doubt_friction(self.friction, f"contact {label!r}: friction")
         if self.torsional_friction is not None:
             what = f"contact {label!r}: torsional_friction"
             check_length(self.torsional_friction, what, LONGEST_SOLE)

@@ -225,6 +225,16 @@ class Drives(ShortRepr):
         object.__setattr__(self, "held", FrozenMapping(held))
         followers = [coupling.joint for coupling in self.couplings]
         _reject_twice(followers, "follows two joints")
+        leaders = {coupling.joint: coupling.of for coupling in self.couplings}
+        for joint in followers:
+            chain = [joint]
+            while chain[-1] in leaders and chain.count(chain[-1]) == 1:
+                chain.append(leaders[chain[-1]])
+            if chain.count(chain[-1]) > 1:
+                raise InvalidInputError(
+                    f"joints follow each other in a circle ({' follows '.join(chain)}): none "
+                    "leads. Leave one of these couplings out."
+                )
         driven = [joint for each in self.transmissions for joint in each.joints]
         _reject_twice(driven, "is driven by two transmissions")
         _reject_twice(self.motors or (), "is named twice among the motors")

@@ -82,18 +82,21 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
     A joint about the named axis of the contact frame would free it.
     """
-    if stance.closures is not None:
-        return ()  # a loop's joints do not move alone
-    limbs: dict[str, list[str]] = {}
+    tied = _tied_joints(stance)
+    limbs: dict[tuple[str, str], list[str]] = {}
     for contact in stance.contacts:
+        if tied.intersection(stance.limb(contact)):
+            continue  # joints of a loop or coupling do not move alone
         lacks, count = _lacking(stance, contact), len(stance.limb(contact))
         free = len(contact.components)
         if lacks and count < free:
-            why = f"{count} joints where {free} place it freely, none {' or '.join(lacks)}"
-            limbs.setdefault(why, []).append(contact.name)
+            joints = f"{count or 'no'} joint{'s' * (count != 1)}"
+            why = f"where {free} place it freely, none {' or '.join(lacks)}"
+            limbs.setdefault((joints, why), []).append(contact.name)
     return tuple(
-        f"the limb of {' and that of '.join(names)} {'has' if len(names) == 1 else 'have'} {why}"
-        for why, names in limbs.items()
+        f"the limb{'s' * (len(names) > 1)} of {_listed(names)} "
+        + (f"have {joints} each {why}" if len(names) > 1 else f"has {joints} {why}")
+        for (joints, why), names in limbs.items()
     )
 
 
@@ -125,8 +128,14 @@ def closure_notes(stance: Stance) -> tuple[str, ...]:
     least = float(sizes[sizes > RANK_TOLERANCE].min(initial=np.inf))
     if least > _ALIKE:
         return ()
+    contacts = np.linalg.svd(stance.jacobian, compute_uv=False)
+    alone = float(contacts[contacts > RANK_TOLERANCE].min(initial=np.inf)) <= _ALIKE
+    if alone:
+        what = "The contacts all but repeat what they hold themselves"
+    else:
+        what = "Loops and couplings all but repeat what the contacts hold"
     return (
-        f"Loops and couplings all but repeat what the contacts hold (smallest singular value "
+        f"{what} (smallest singular value "
         f"{least:.1e}): links and ground that yield by a little share the forces between them "
         "otherwise than these rigid ones, and feet may creep.",
     )
@@ -146,6 +155,24 @@ def hanging_notes(stance: Stance) -> tuple[str, ...]:
         f"No motor holds {', '.join(names)}: {it} hang{'s' * (it == 'it')} where gravity and "
         f"springs leave a rest, and every posture follows.{fall if least <= 0.0 else ''}",
     )
+
+
+def _tied_joints(stance: Stance) -> set[int]:
+    """Indices of the joints that loops and couplings move together."""
+    if stance.closures is None:
+        return set()
+    moved = np.abs(stance.closures.jacobian).max(axis=0) > RANK_TOLERANCE
+    joints = list(stance.robot.model.joints)
+    return {
+        i
+        for i in range(2, len(joints))
+        if moved[joints[i].idx_v : joints[i].idx_v + joints[i].nv].any()
+    }
+
+
+def _listed(names: list[str]) -> str:
+    """Names as in a sentence: a, b and c."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _lacking(stance: Stance, contact: Contact) -> list[str]:

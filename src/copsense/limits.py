@@ -15,6 +15,7 @@ from copsense.contact import Contact, edge_row
 from copsense.content import ByContent, ShortRepr, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.load_problem import LoadProblem
+from copsense.magnitudes import doubt_friction
 from copsense.polygon import Polygon
 from copsense.robot import Robot
 from copsense.stance import Stance, check_stance
@@ -142,7 +143,12 @@ def _bound(name: str, value: object, contact: str = "") -> float:
     what = f"limit {name}" + (f" of contact {contact!r}" if contact else "")
     number = finite_number(value, what)
     if number < 0 and not (contact and name == "normal_force"):
-        raise InvalidInputError(f"{what} must be a non-negative number or None, got {value}.")
+        named = " A contact that may pull is named: {contact: value}." * (name == "normal_force")
+        raise InvalidInputError(
+            f"{what} must be a non-negative number or None, got {value}.{named}"
+        )
+    if name == "friction":
+        doubt_friction(number, what)
     return number
 
 

@@ -14,6 +14,7 @@ from copsense.errors import InvalidInputError
 LONGEST = 20.0  # m: no part of a robot is longer
 LONGEST_SOLE = 5.0  # m
 _MASSES = 3.0  # of a robot, from which its payload is doubted
+_STICKY = 20.0  # times the normal force, from which friction is doubted
 _BEYOND = 10.0  # times its range, from which a slide's position is not metres
 _TURN = 2 * math.pi * (1 + 1e-9)
 
@@ -115,6 +116,17 @@ def doubt_payload(kilograms: float, robot: str, mass: float, what: str) -> None:
         warnings.warn(
             f"{what} is {kilograms:.4g} kg, {abs(kilograms) / mass:.3g} times the mass of "
             f"{robot!r}. Masses are in kilograms: {kilograms:.4g} g are {kilograms / 1e3:.4g} kg.",
+            MagnitudeWarning,
+            stacklevel=3,
+        )
+
+
+def doubt_friction(coefficient: float, what: str) -> None:
+    """Warn of a coefficient of friction that no sole and floor have."""
+    if coefficient > _STICKY:
+        warnings.warn(
+            f"{what} is {coefficient:.4g}. It is a ratio of forces, 0.3 to 1.2 for most soles: "
+            f"{coefficient:.4g} % are {coefficient / 100:.4g}.",
             MagnitudeWarning,
             stacklevel=3,
         )

@@ -457,7 +457,11 @@ class Robot:
     def joint_id(self, name: str) -> int:
         """Index of an actuated joint in the model, or an error that lists the valid ones."""
         if name not in self.joint_names:
-            raise UnknownNameError(f"joint in robot {self.name!r}", name, self.joint_names)
+            still = self.model.existFrame(name, pin.FrameType.FIXED_JOINT)
+            remedy = (
+                f"{name!r} is fixed in the file, or locked: it stays where it is." if still else ""
+            )
+            raise UnknownNameError(f"joint in robot {self.name!r}", name, self.joint_names, remedy)
         return int(self.model.getJointId(name))
 
     def velocity_index(self, joint: str) -> int:
@@ -584,6 +588,22 @@ class Robot:
                 "length. Give it in the order x, y, z, w; pin.normalize(model, q) fixes rounding."
             )
         return read_only(pin.normalize(self.model, array))
+
+    def check_positions(self, q: Float[np.ndarray, " nq"]) -> None:
+        """Reject joints of a configuration where only another unit explains them.
+
+        Raises:
+            InvalidInputError: degrees, or millimetres, beyond a joint's limits.
+        """
+        if np.abs(q[3 if self.base_nv == 6 else 2 :]).max(initial=0.0) <= 2 * np.pi:
+            return  # no joint turns further: nothing to look at in detail
+        for name, unit in zip(self.dof_names, self.dof_units, strict=True):
+            joint = self.model.joints[self.model.getJointId(name)]
+            if name in self.joint_names and joint.nq == 1:
+                lower = float(self.model.lowerPositionLimit[joint.idx_q])
+                upper = float(self.model.upperPositionLimit[joint.idx_q])
+                if not lower <= q[joint.idx_q] <= upper:
+                    check_joint_position(float(q[joint.idx_q]), name, unit, lower, upper)
 
     def _configuration(self, q: object) -> Float[np.ndarray, " nq"]:
         meaning = (

@@ -120,6 +120,7 @@ class Stance:
         ):
             object.__setattr__(self, name, value)
         if check:
+            self.robot.check_positions(q)
             for k, contact in enumerate(contacts):
                 _check_plane(contact, feet[k])
             check_support(self)
@@ -433,13 +434,23 @@ class Stance:
         Contacts that hold a motion to second order are in place where e = 0, and Newton's method on
         them alone only halves its error.
         """
-        return self._folds[1:]
+        return self._folds[1:3]
+
+    @property
+    def branching(self) -> bool:
+        """Whether motions part here, as of two legs without a yaw that stand exactly parallel.
+
+        Q, see `false_motions`, then has both signs: J is deficient at this very posture, and on the
+        way along most motions it is not, so that wrenches have no derivative.
+        """
+        return self._folds[3]
 
     @cached_property
-    def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         u, Z = self._motions.redundant, self._motions.null
         if not u.shape[1]:
-            return read_only(Z[:, :0]), read_only(Z.T[:0]), read_only(np.zeros(0))
+            return read_only(Z[:, :0]), read_only(Z.T[:0]), read_only(np.zeros(0)), False
+        branching = False
         motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
         for y in u.T:
             turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
@@ -450,9 +461,11 @@ class Stance:
                 motions.append(false)
                 rows.append(false.T @ turned)
                 errors.append(false.T @ self.constraints.T @ y)
+            elif curved.any():
+                branching = True
         left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
         found = left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
-        return read_only(found[0]), read_only(found[1]), read_only(found[2])
+        return read_only(found[0]), read_only(found[1]), read_only(found[2]), branching
 
     @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:

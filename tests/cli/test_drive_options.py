@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.commands import copsense as run
 from support.driven_files import urdf
+from support.walkers import BIPED, walker
 
 import copsense
 from copsense.cli.drive_options import read_drives
@@ -88,3 +89,18 @@ def test_the_command_takes_them(tmp_path):
     )
     wanted = json.loads(json.dumps(copsense.analyse(stance).to_dict()))
     assert said.json["criteria"] == wanted["criteria"]
+
+
+def test_a_loop_that_joints_cannot_close_and_a_locked_joint_are_said(tmp_path):
+    path = tmp_path / "walker.urdf"
+    path.write_text(walker())
+    feet = [word for foot in BIPED for word in ("--contact", foot)]
+    answer = run("analyse", path, *feet, "--contact-at", "sole", "--loop", "trunk@0:0:2=l_foot")
+    assert answer.code == 2
+    assert "trunk - l_foot" in answer.err
+    assert "cannot be closed: the joints leave" in answer.err
+    answer = run("analyse", path, *feet, "--lock", "l_knee", "--posture", "l_knee=20")
+    assert answer.code == 2
+    assert "'l_knee' is fixed in the file, or locked" in answer.err
+    answer = run("analyse", path, *feet, "--contact-at", "sole", "--width", "0.04")
+    assert answer.err.count("lie in each other") == 1  # a note is said once

@@ -37,7 +37,7 @@ def test_legs_without_ankle_roll_stand_and_lack_a_roll(five):
     assert five.com[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
     (clause,) = missing_joints(five)
     assert clause == (
-        "the limb of l_foot and that of r_foot have 5 joints where 6 place it freely, none about "
+        "the limbs of l_foot and r_foot have 5 joints each where 6 place it freely, none about "
         "x (roll)"
     )
     assert "11 of 12 directions" in freedom_notes(five)[0]
@@ -141,6 +141,6 @@ def test_a_chart_says_what_holds_the_com_fast(five):
     found = PostureChart(five, ["com_x", "com_y"], compiled=False).solve([[0.0, 0.0], [0.0, 0.01]])
     assert found.reasons[0] == ""
     assert found.reasons[1].startswith(
-        "unreachable: the contacts hold the CoM's y fast: the limb of"
+        "unreachable: the contacts hold the CoM's y fast: the limbs of"
     )
     assert "none about x (roll)" in found.reasons[1]

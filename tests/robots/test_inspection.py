@@ -55,6 +55,25 @@ def test_feet_are_found_by_geometry_under_any_name_with_their_soles(tmp_path):
     assert "head: sole 200 x 80 mm, 50 mm under the frame; read from its collision" in answer.err
 
 
+def test_parallel_legs_without_a_yaw_get_a_line_by_which_wrenches_have_a_derivative(tmp_path):
+    """The usual small biped: hip roll, three pitches, ankle roll; upright it stands at a branch."""
+    path = written(tmp_path, walker(FULL[1:]))
+    found = inspect_robot(path)
+    assert found.line.width == pytest.approx(1.2 * 0.2, abs=1e-3)
+    (note,) = [note for note in found.notes if "exactly parallel" in note]
+    assert "limbs of l_foot and r_foot have 5 joints each" in note
+    assert "about z (yaw)" in note
+    answer = run(str(found.line))
+    assert answer.code == 0
+    assert "held twice" not in answer.err
+    words = shlex.split(str(found.line))
+    at = words.index("--width")
+    answer = copsense(*words[1:at], *words[at + 2 :], "--load", "trunk=0:5:0")
+    assert answer.code == 2
+    assert "no derivative here. The limbs of l_foot and r_foot have 5 joints each" in answer.err
+    assert "(width=, --width)" in answer.err
+
+
 @pytest.mark.parametrize(
     ("axes", "heading", "option"),
     [(None, 0.0, None), (BACK, 180.0, "--base-yaw=180"), (SIDE, 90.0, "--base-yaw=270")],

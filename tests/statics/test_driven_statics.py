@@ -295,6 +295,13 @@ def test_an_open_loop_is_an_error():
         (lambda: Drives(held={"l_knee": np.nan}), InvalidInputError, "l_knee"),
         (lambda: Drives(couplings=(Coupling("l_knee", "l_knee"),)), InvalidInputError, "itself"),
         (
+            lambda: Drives(
+                couplings=(Coupling("a", "b"), Coupling("b", "c", 2.0), Coupling("c", "b", 0.5))
+            ),
+            InvalidInputError,
+            r"in a circle \(a follows b follows c follows b\): none leads",
+        ),
+        (
             lambda: Drives(couplings=(Coupling("l_knee", "arm"), Coupling("l_knee", "l_hip"))),
             InvalidInputError,
             "two joints",

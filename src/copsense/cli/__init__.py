@@ -15,6 +15,7 @@ import click
 
 from copsense._version import __version__
 from copsense.cli.lazy_group import LazyGroup, Place
+from copsense.cli.printing import echo_notes
 from copsense.errors import CopsenseError
 
 _COMMANDS = {
@@ -92,4 +93,4 @@ def _run() -> int:
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    click.echo(f"note: {message}", err=True)
+    echo_notes([str(message)])

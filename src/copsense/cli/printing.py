@@ -33,9 +33,13 @@ def echo_json(value: Mapping[str, Any]) -> None:
 
 
 def echo_notes(notes: Iterable[str]) -> None:
-    """Print notes on standard error, where they stay out of what is piped on."""
+    """Print notes on standard error, where they stay out of what is piped on; each once."""
+    context = click.get_current_context(silent=True)
+    said: set[str] = set() if context is None else context.meta.setdefault(__name__, set())
     for note in notes:
-        click.echo(f"note: {note}", err=True)
+        if note not in said:
+            click.echo(f"note: {note}", err=True)
+        said.add(note)
 
 
 def echo_written(*paths: str | Path | None) -> None:

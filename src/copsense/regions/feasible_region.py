@@ -6,7 +6,7 @@ import numpy as np
 
 from copsense.arrays import finite_number
 from copsense.errors import InvalidInputError
-from copsense.limits import Limits, limit_rows
+from copsense.limits import Limits, check_limits, limit_rows
 from copsense.load_problem import LoadProblem
 from copsense.magnitudes import in_metres
 from copsense.reach import robot_reach
@@ -14,7 +14,7 @@ from copsense.regions.refinement import Point, refine
 from copsense.regions.region import BOX, MERGE, ComRegion, region_between
 from copsense.regions.support_program import SupportProgram
 from copsense.regions.weight_line import com_axes, gravity_slope
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 FINEST = 1e-7  # m: tolerances below this ask more than the linear programs resolve
 
@@ -40,6 +40,8 @@ def com_region(stance: Stance, limits: Limits, *, tolerance: float = 1e-4) -> Co
         InvalidInputError: a bad tolerance, or limits that do not fit the stance.
         UnknownNameError: a torque limit names no joint.
     """
+    check_stance(stance)
+    check_limits(limits)
     if finite_number(tolerance, "the tolerance [m]", positive=True) < FINEST:
         raise InvalidInputError(
             f"the tolerance is {tolerance:g} m, finer than linear programs resolve. Give "

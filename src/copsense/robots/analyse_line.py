@@ -15,7 +15,7 @@ from copsense.contact import Contact, rectangle
 from copsense.content import freeze
 from copsense.drives import Drives
 from copsense.errors import CopsenseError
-from copsense.freedom import com_held
+from copsense.freedom import com_held, missing_joints
 from copsense.robot import Robot
 from copsense.robots.contact_soles import ContactAt
 from copsense.robots.feet import Foot
@@ -25,6 +25,7 @@ from copsense.shapes import Geometry
 from copsense.stance import Stance
 
 _GUESSED = ((-0.08, 0.12), (-0.04, 0.04))  # m: a sole where none can be read
+_WIDER = 1.2  # times as far apart, two feet under parallel legs
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ class AnalyseLine:
             `own`.
         own: the contacts that the caller gave, instead of `contacts`.
         level_soles: ``--level-soles``; of `own`, among the words given.
+        width: ``--width`` [m], or None.
     """
 
     source: str
@@ -59,6 +61,7 @@ class AnalyseLine:
     given: tuple[str, ...] = ()
     own: tuple[Contact, ...] = ()
     level_soles: bool = False
+    width: float | None = None
 
     def __post_init__(self) -> None:
         """Own the posture and the offsets."""
@@ -76,6 +79,8 @@ class AnalyseLine:
             words.append(f"--base-yaw={yaw:g}")
         for joint, position in self.posture.items():
             words += ["--posture", f"{joint}={math.degrees(position):g}"]
+        if self.width is not None:
+            words += ["--width", f"{self.width:g}"]
         for folder in self.package_dirs:
             words += ["--package-dir", folder]
         return shlex.join([*words, *self.given])
@@ -112,6 +117,7 @@ class AnalyseLine:
             level_soles=self.level_soles,
             posture=self.posture,
             base_rpy=np.radians(self.base_rpy) if any(self.base_rpy) else None,
+            width=self.width,
             drives=drives,
             locked=locked,
         )
@@ -178,10 +184,39 @@ def first_that_stands(
         except CopsenseError as error:
             reason = str(error)
             continue
+        if stance.branching and len(stance.contacts) == 2 and line.width is None:
+            line, stance, apart = _apart(line, stance, stand)
+        else:
+            apart = ""
         # What most commands move is the CoM's y.
         held = com_held(stance, 1) if stance.robot.base_nv == 6 else ""
-        notes = tuple(filter(None, dict.fromkeys([*(str(each.message) for each in said), held])))
+        told = [*(str(each.message) for each in said), held, apart]
+        notes = tuple(filter(None, dict.fromkeys(told)))
         if not any(issubclass(each.category, ImplausibleStanceWarning) for each in said):
             return line, "", notes
         doubtful = doubtful or (line, "", notes)
     return doubtful or (None, reason, ())
+
+
+def _apart(
+    line: AnalyseLine, stance: Stance, stand: Callable[[AnalyseLine], Stance]
+) -> tuple[AnalyseLine, Stance, str]:
+    """The line with its feet wider apart where its legs stand exactly parallel, if that helps."""
+    first, second = (place.translation for place in stance.placements)
+    wider = replace(line, width=round(_WIDER * float(np.linalg.norm(second - first)), 3))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = stand(wider)
+    except CopsenseError:
+        return line, stance, ""
+    if found.branching:
+        return line, stance, ""
+    lacking = "; ".join(missing_joints(stance))
+    return (
+        wider,
+        found,
+        "Legs that stand exactly parallel let the contacts lose rank, and wrenches have no "
+        f"derivative there: the line puts the feet wider apart (--width). {lacking[:1].upper()}"
+        f"{lacking[1:]}{'.' if lacking else ''}".rstrip(),
+    )

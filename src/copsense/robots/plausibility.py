@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,8 @@ from jaxtyping import Float
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
-from copsense.magnitudes import in_metres
+from copsense.magnitudes import in_metres, in_radians
+from copsense.polygon import Polygon
 from copsense.reach import robot_reach
 from copsense.stance import Stance
 
@@ -23,6 +25,10 @@ _FAR_SLID = 0.05  # m
 _THIN = 1 / 200  # of the robot's reach: a narrower sole is hardly all of it
 _FLIPPED = 0.5  # cosine under which a contact was not where its base was turned to: 60 degrees
 _UP = 0.1  # z of a contact's normal from which it stands on something
+_LEVEL = 5e-3  # m, and 1 - cosine: soles within it are on one plane
+_OVERLAP = 0.1  # of the smaller sole, from which two lie in each other
+_STRONG = 3.0  # times weight and reach, from which a held torque is doubted
+_WOUND = 4 * np.pi  # rad, from which a spring's rest is hardly in radians
 _NAMED = 3  # joints that a doubt names
 
 
@@ -75,6 +81,8 @@ def plausibility_notes(stance: Stance) -> tuple[str, ...]:
     return (
         *_size_notes(stance),
         *_sole_notes(stance),
+        *_overlap_notes(stance),
+        *_drive_notes(stance),
         *_joint_notes(stance),
         *_hanging_notes(stance),
     )
@@ -171,6 +179,53 @@ def _sole_notes(stance: Stance) -> list[str]:
                 f"The sole of {contact.name!r} is {length * 1e3:.3g} x {width * 1e3:.2g} mm, thin "
                 f"under a robot of {reach:.2g} m: is that the whole sole? Give the polygon "
                 "(--sole X0:X1:Y0:Y1), another frame, or a point contact."
+            )
+    return notes
+
+
+def _overlap_notes(stance: Stance) -> list[str]:
+    """Soles of two links on one plane that lie in each other."""
+    soles = [
+        (contact.name, contact.sole, place, contact.on(stance.robot).joint)
+        for contact, place in zip(stance.contacts, stance.placements, strict=True)
+        if contact.kind == "surface" and contact.sole is not None and contact.sole.area
+    ]
+    notes = []
+    for (name, sole, here, link), (near, two, there, other) in combinations(soles, 2):
+        relative = here.actInv(there)
+        if link == other or relative.rotation[2, 2] < 1 - _LEVEL:
+            continue
+        corners = np.pad(two.vertices, ((0, 0), (0, 1)))
+        x, y, z = (corners @ relative.rotation.T + relative.translation).T
+        if np.abs(z).max() > _LEVEL:
+            continue
+        common = Polygon.merged(np.column_stack([x, y]), 0.0).within(sole.normals, sole.offsets)
+        share = common.area / min(sole.area, two.area)
+        if share > _OVERLAP:
+            notes.append(
+                f"The soles of {name!r} and {near!r} lie in each other by "
+                f"{share * 100:.0f} % of the smaller one, which two feet cannot. Put them farther "
+                "apart (width=, --width), or give each its own part (polygon=, --sole)."
+            )
+    return notes
+
+
+def _drive_notes(stance: Stance) -> list[str]:
+    """Torques of springs and of who holds a joint, far beyond what weight can do to it."""
+    robot, notes = stance.robot, []
+    most = _STRONG * robot.weight * robot_reach(robot)
+    for joint, torque in robot.drives.held.items():
+        if abs(torque) > most:
+            notes.append(
+                f"The torque held on joint {joint!r} is {torque:.4g} Nm, and all of the weight at "
+                f"the end of {robot.name!r} is {most / _STRONG:.2g} Nm. Torques are in "
+                f"newton-metres: {torque:.4g} Nmm are {torque / 1e3:.4g} Nm."
+            )
+    for joint, spring in robot.drives.springs.items():
+        if robot.joint_unit(joint) == "rad" and abs(spring.rest) > _WOUND:
+            notes.append(
+                f"The spring of joint {joint!r} rests at {spring.rest:.4g} rad, "
+                f"{abs(spring.rest) / (2 * np.pi):.2g} turns away. {in_radians(spring.rest)}"
             )
     return notes
 

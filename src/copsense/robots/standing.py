@@ -19,7 +19,7 @@ from copsense.arrays import (
     finite_array,
     finite_number,
 )
-from copsense.closing import close
+from copsense.closing import check_closable, close
 from copsense.contact import Contact, Plane
 from copsense.description import is_file, load_description
 from copsense.drives import Drives
@@ -206,6 +206,7 @@ def load_stance(
     wanted = checked_positions(posture, "the posture's joints")
     q = robot.configuration({**rest_positions(robot), **own, **wanted})
     q = close(robot, q, held=wanted or own)
+    check_closable(robot, q)
     if base_rpy is not None and robot.base_nv != 6:
         raise InvalidInputError(
             f"robot {robot.name!r} lives in a plane: its base has no orientation to choose. Leave "

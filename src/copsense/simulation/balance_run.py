@@ -31,6 +31,12 @@ from copsense.simulation.timed_prediction import timed_note
 from copsense.stance import Stance, check_stance
 from copsense.statics import with_tie_breaks
 
+_ENGINE_SHARES = (
+    "The engine shares the forces that no motor feels by how its contacts yield, not by the "
+    "tie-break: single loads and margins that are measured, as of a toe beside its foot, may "
+    "differ from the predicted ones and from the limits."
+)
+
 
 def balance(
     stance: Stance,
@@ -97,6 +103,8 @@ def balance(
     if predicted is not None:
         tied, notes = with_tie_breaks([stance], {predicted.name: predicted})
         (predicted,) = tied.values()
+        if notes:
+            notes = (*notes, _ENGINE_SHARES)
     if controller is None:
         assert predicted is not None
         controller = BalancingController(

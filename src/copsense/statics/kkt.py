@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float
 
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
+from copsense.freedom import missing_joints
 from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
@@ -110,11 +111,14 @@ class Kkt:
             left = np.abs(self.system.matrix @ dx - right).max(initial=0.0)
             if left > 1e-7 * max(1.0, np.abs(right).max(initial=0.0)):
                 loose = moved_joints(stance.robot, stance.unheld_motions)
+                lacking = "; ".join(missing_joints(stance))
                 raise UndeterminedWrenchError(
-                    "the contacts lose rank at this very posture (a straight leg, say): the "
-                    "wrenches have no derivative here. "
+                    "the contacts lose rank at this very posture: the wrenches have no derivative "
+                    "here. "
                     + (f"No motor holds {', '.join(loose)}. " if loose else "")
-                    + "Move the posture off the singularity."
+                    + (f"{lacking[0].upper()}{lacking[1:]}. " if lacking else "")
+                    + "Move the posture off the singularity: bend a leg that is straight, and put "
+                    "legs that stand exactly parallel a little apart or together (width=, --width)."
                 )
         df = dx[self.size :]
         if self.tie:

@@ -62,6 +62,11 @@ def policy_name(policy: object) -> str:
             f"{policy!r} is neither a Criterion nor a callable q -> wrenches. Give one of them, "
             "such as criterion_named('minimum-torque')."
         )
+    if getattr(policy, "__module__", None) == Criterion.__module__:
+        name = getattr(policy, "__name__", "minimum_torque")
+        raise InvalidInputError(
+            f"{name} is a function that makes a criterion, and none itself. Call it: {name}(...)."
+        )
     return str(getattr(policy, "__name__", type(policy).__name__))
 
 
