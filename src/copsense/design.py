@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -28,6 +28,9 @@ from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
 from copsense.stance import Stance
 from copsense.statics import TIE_BREAK, with_tie_breaks
+
+if TYPE_CHECKING:
+    from copsense.plots.style import Figure
 
 Objective = Literal["travel", "gain"]
 NO_LIMIT = "none within the path"  # a score's first limit where the path ends before any
@@ -135,6 +138,12 @@ class Design(ShortRepr):
             return f"{what} {change * 100:+.0f} % over the better of the paper's two"
         found = f"{what} {change * 100:+.1f} %"
         return f"no better than {best.criterion} ({found}): keep {best.criterion}"
+
+    def plot(self) -> Figure:
+        """What the design gains, and what it costs, `copsense.plots.plot_design`."""
+        from copsense.plots import plot_design
+
+        return plot_design(self)
 
     def to_dict(self) -> dict[str, Any]:
         """What ``copsense design --json`` prints: plain data, a `Score` as its fields."""

@@ -2,6 +2,7 @@
 
 import math
 import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -254,3 +255,16 @@ def test_views_own_what_they_hold(model):
     assert len(view.rows) == 4
     assert math.isclose(sum(found.load_share), 1.0)
     assert "first, after" in view.verdict
+
+
+def test_criteria_that_go_equally_far_are_said_to(model):
+    view = model.view(model.start)
+    wrench = view["minimum-wrench"]
+    near, far = (replace(wrench, name=n, com_travel=wrench.com_travel * f) for n, f in (
+        ("again", 1 + 1e-9), ("farther", 1.5)
+    ))  # fmt: skip
+    said = replace(view, criteria=(wrench, near, far)).verdict
+    least = 1e3 * wrench.com_travel.min()
+    assert said.split("; ")[1].startswith("minimum-wrench and again equally: ")
+    assert said.endswith(f"first, after {least:.1f} mm")
+    assert said.startswith("farther: ")

@@ -7,6 +7,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 import copsense
 from copsense import plots
@@ -14,8 +15,10 @@ from copsense.errors import InvalidInputError, OutputError
 from copsense.paper.reproduce.clock import Clock
 from copsense.paper.reproduce.sideways import sweep_sideways
 from copsense.plots.reading import world_soles
-from copsense.plots.style import colours
+from copsense.plots.style import axes_or_new, colours, given_axes
 from copsense.polygon import Polygon
+from copsense.posture import move_stance
+from copsense.skeleton import skeleton
 
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
 WHOLE = [plots.plot_results, plots.plot_soles, plots.plot_sensitivity, plots.plot_torques]
@@ -246,8 +249,10 @@ def test_the_soles_are_turned_with_their_feet(lateral):
 def test_a_stance_shows_where_each_cop_would_go(icub):
     found = [copsense.cop_sensitivity(icub, criterion) for criterion in CRITERIA]
     figure = rendered(plots.plot_stance(icub, found))
-    assert [ax.get_title(loc="left") for ax in figure.axes] == ["minimum-wrench", "minimum-torque"]
-    for ax, result in zip(figure.axes, found, strict=True):
+    *robot, wrench, torque = figure.axes
+    assert [ax.get_title(loc="left") for ax in robot] == ["from behind", "from its right"]
+    assert [ax.get_title(loc="left") for ax in (wrench, torque)] == [c.name for c in CRITERIA]
+    for ax, result in zip((wrench, torque), found, strict=True):
         arrows = [text for text in ax.texts if text.get_text() == ""]
         assert len(arrows) == 4
         (y, x), tip = arrows[1].xyann, arrows[1].xy  # of the left foot, the CoM to the left
@@ -259,7 +264,7 @@ def test_a_stance_shows_where_each_cop_would_go(icub):
 def test_a_quadrupeds_stance_says_when_a_foot_unloads(stance_of):
     stance = stance_of("solo12")
     figure = rendered(plots.plot_stance(stance, [copsense.cop_sensitivity(stance, CRITERIA[1])]))
-    words = [text.get_text() for text in figure.axes[0].texts]
+    words = [text.get_text() for text in figure.axes[-1].texts]
     assert sum("unloads after" in text for text in words) == 4
 
 
@@ -269,6 +274,125 @@ def test_a_stance_needs_sensitivities_of_its_own(icub, stance_of):
     other = copsense.cop_sensitivity(stance_of("solo12"), CRITERIA[1])
     with pytest.raises(InvalidInputError, match="of the stance it draws"):
         plots.plot_stance(icub, [other])
+
+
+def marks_of(ax, marker):
+    """Where the marks of that kind are (k, 2)."""
+    return np.vstack([line.get_xydata() for line in ax.lines if line.get_marker() == marker])
+
+
+@pytest.mark.parametrize(("side", "across"), [("behind", 1), ("right", 0)])
+def test_a_robot_stands_on_its_soles_under_its_com(leaning, side, across):
+    found = copsense.cop_sensitivity(leaning, CRITERIA[0])
+    ax = plots.plot_robot(leaning, [found], side=side)
+    com = leaning.com * 1e3
+    assert marks_of(ax, "+").tolist() == [[pytest.approx(com[across]), pytest.approx(com[2])]]
+    ring, *cops = marks_of(ax, "o")
+    assert ring == pytest.approx([com[across], 0.0], abs=1e-6)
+    for cop, place, own in zip(cops, leaning.placements, found.cop, strict=True):
+        there = place.act(np.append(own, 0.0)) * 1e3
+        assert cop == pytest.approx(there[[across, 2]], abs=1e-6)
+    bones = [line.get_xydata() for line in ax.lines if len(line.get_xydata()) == 2]
+    drawn = np.array([b for b in bones if b.shape == (2, 2)])
+    for bone in skeleton(leaning)[:, :, [across, 2]] * 1e3:
+        assert np.isclose(drawn, bone).all(axis=(1, 2)).any()
+    left, right = ax.get_xlim()
+    assert (left > right) == (side == "behind")  # left is left; forward is to the right
+
+
+@pytest.fixture(scope="module")
+def leaning(icub):
+    return move_stance(icub, com_y=0.02)
+
+
+# --- the caller's axes ----------------------------------------------------------------------------
+
+
+def test_two_sweeps_share_axes_with_their_names_and_colors(lateral):
+    one, other = (lateral.subset([name.name]) for name in CRITERIA)
+    figure = Figure()
+    mine, untouched = figure.subplots(1, 2)
+    mine.plot([0, 0.01], [0, 0.02], label="measured")
+    mine.legend()
+    size, settings = tuple(figure.get_size_inches()), dict(mpl.rcParams)
+    assert plots.plot_cop(one, ax=mine, label="stiff", color="black") is mine
+    plots.plot_cop(other, ax=mine, label="soft", color={"minimum-torque": "#009E73"})
+    legend = {t.get_text(): h for t, h in zip(
+        mine.get_legend().get_texts(), mine.get_legend().legend_handles, strict=True
+    )}  # fmt: skip
+    assert list(legend) == ["measured", "stiff", "soft", "CoM", "off its sole"]
+    assert (to_hex(legend["stiff"].get_color()), to_hex(legend["soft"].get_color())) == (
+        "#000000",
+        "#009e73",
+    )
+    named = [line for line in mine.lines if line.get_label() == "soft"]
+    assert [to_hex(line.get_color()) for line in named] == ["#009e73"]
+    assert figure.axes == [mine, untouched]
+    assert not untouched.has_data()
+    assert (tuple(figure.get_size_inches()), dict(mpl.rcParams)) == (size, settings)
+
+
+@pytest.mark.parametrize("plot", [plots.plot_sensitivity, plots.plot_torques])
+def test_panels_are_drawn_into_the_axes_given(lateral, plot):
+    figure = Figure()
+    axes = figure.subplots(2, 1)
+    assert plot(lateral, axes=axes, label="icub") is figure
+    assert all(ax.has_data() for ax in axes)
+    words = [text.get_text() for text in axes[0].get_legend().get_texts()]
+    assert words[:2] == ["icub, minimum-wrench", "icub, minimum-torque"]
+    assert len(figure.axes) == 2
+
+
+def test_a_stance_is_drawn_into_the_axes_given(icub):
+    found = [copsense.cop_sensitivity(icub, criterion) for criterion in CRITERIA]
+    figure = Figure()
+    axes = figure.subplots(1, 2)
+    assert plots.plot_stance(icub, found, axes=axes) is figure
+    assert figure.axes == list(axes)
+    assert not figure.legends
+    with pytest.raises(
+        InvalidInputError, match="2 Matplotlib Axes, one for each of minimum-wrench"
+    ):
+        plots.plot_stance(icub, found, axes=axes[:1])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"color": "red"}, "would make them look alike"),
+        ({"color": {"minimum-wrench": "reddish"}}, "'reddish' is not a color"),
+        ({"color": {"least": "red"}}, "'least', which is not drawn. Choose from minimum-wrench"),
+    ],
+)
+def test_colors_that_cannot_be_are_said(lateral, options, said):
+    with pytest.raises(InvalidInputError, match=said):
+        plots.plot_load(lateral, **options)
+
+
+@pytest.mark.parametrize(
+    ("axes", "said"),
+    [
+        (Figure().subplots(1, 3), "the slope, the gain; given: 3"),
+        (Figure().subplots(1, 1, squeeze=False), "given: 1"),
+    ],
+)
+def test_axes_of_the_wrong_number_are_refused(lateral, axes, said):
+    with pytest.raises(InvalidInputError, match=said):
+        plots.plot_sensitivity(lateral, axes=axes)
+
+
+def test_what_is_no_axes_is_refused():
+    with pytest.raises(InvalidInputError, match="given: a str"):
+        given_axes(["a", "b"], ["the slope", "the gain"])
+    with pytest.raises(InvalidInputError, match=r"one Matplotlib Axes, not a ndarray.*axes\[0\]"):
+        axes_or_new(Figure().subplots(1, 2))
+
+
+def test_notebooks_show_a_figure(lateral):
+    drawn = plots.plot_load(lateral).figure
+    shown = drawn._repr_png_()
+    assert shown.startswith(b"\x89PNG")
+    assert int.from_bytes(shown[16:20]) == pytest.approx(90 * drawn.get_figwidth(), abs=1)
 
 
 # --- files and state ----------------------------------------------------------------------------

@@ -99,7 +99,7 @@ class Analysis:
         return table(self._data)
 
     def plot(self) -> Figure:
-        """The stance from above, `copsense.plots.plot_stance`."""
+        """The robot, and each criterion from above, `copsense.plots.plot_stance`."""
         from copsense.plots import plot_stance
 
         return plot_stance(self.stance, list(self.sensitivities.values()))

@@ -35,7 +35,7 @@ def verdict(data: dict[str, Any]) -> str:
             f"No sole is known under {', '.join(blind)}, so when it tips is not either: give "
             "--sole X0:X1:Y0:Y1."
         )
-    best, equal = _farthest(reach)
+    best, *equal = ranked(reach)[0]
     distance, event = reach[best]
     if distance < 0:
         return f"Every criterion has a contact that tips or pulls; nearest to standing: {best}."
@@ -43,7 +43,7 @@ def verdict(data: dict[str, Any]) -> str:
         return "No contact tips or unloads, to first order, wherever the CoM can go."
     if equal:
         return (
-            f"{_listed([best, *equal])} keep the feet planted equally long: to first order the CoM "
+            f"{listed([best, *equal])} keep the feet planted equally long: to first order the CoM "
             f"may move {distance * 1e3:.1f} mm before {event}{_others(reach, best, *equal)}."
         )
     return (
@@ -65,16 +65,16 @@ def _within_limits(data: dict[str, Any]) -> str:
         )
         for name, row in data["criteria"].items()
     }
-    best, equal = _farthest(reach)
+    best, *equal = ranked(reach)[0]
     distance, limit = reach[best]
     if distance == 0:
         return "Every criterion meets a limit here already."
     if not math.isfinite(distance):
-        every = _listed([best, *equal])
+        every = listed([best, *equal])
         return f"{every} {'meet' if equal else 'meets'} no limit within reach."
     if equal:
         return (
-            f"{_listed([best, *equal])} meet their first limit equally late: the CoM may move "
+            f"{listed([best, *equal])} meet their first limit equally late: the CoM may move "
             f"{distance * 1e3:.1f} mm until {limit}{_others(reach, best, *equal)}."
         )
     return (
@@ -83,14 +83,24 @@ def _within_limits(data: dict[str, Any]) -> str:
     )
 
 
-def _farthest(reach: dict[str, tuple[float, str]]) -> tuple[str, list[str]]:
-    """The first criterion that lets the CoM go farthest, and others as far within rounding."""
-    most = max(distance for distance, _ in reach.values())
-    best, *equal = [n for n in reach if math.isclose(reach[n][0], most, rel_tol=_SAME)]
-    return best, equal
+def ranked(reach: dict[str, tuple[float, str]]) -> list[list[str]]:
+    """Criteria by how far they let the CoM go, the farthest first; together if within rounding.
+
+    Args:
+        reach: name -> how far [m] and what ends it.
+    """
+    groups: list[list[str]] = []
+    for name in sorted(reach, key=lambda name: -reach[name][0]):
+        if groups and math.isclose(reach[groups[-1][0]][0], reach[name][0], rel_tol=_SAME):
+            groups[-1].append(name)
+        else:
+            groups.append([name])
+    order = list(reach)
+    return [sorted(group, key=order.index) for group in groups]
 
 
-def _listed(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
+    """Names as a sentence has them: a, b and c."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 

@@ -106,9 +106,9 @@ def design(
         )
     echo_notes(note for note in found.notes if note not in stance.robot.notes)
     if picture is not None:
-        from copsense.plots import plot_design, save_figure
+        from copsense.plots import save_figure
 
-        save_figure(plot_design(found), picture, overwrite=force)
+        save_figure(found.plot(), picture, overwrite=force)
     if as_json:
         echo_json(found.to_dict())
     else:

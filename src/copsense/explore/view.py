@@ -11,6 +11,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.analysis.joint_notes import joint_limit_notes
+from copsense.analysis.verdicts import listed, ranked
 from copsense.content import ShortRepr, freeze
 from copsense.explore.state import State
 from copsense.limits import Limits
@@ -172,20 +173,23 @@ class View(ShortRepr):
     @property
     def verdict(self) -> str:
         """What gives way first under the criterion that lasts longest, and under the others."""
-        found = []
+        reach = {}
         for c in self.criteria:
             travel = np.minimum(c.com_travel, c.unloading_travel)
             k = int(np.argmin(travel))
             word = "tips" if c.com_travel[k] <= c.unloading_travel[k] else "unloads"
-            found.append((float(travel[k]), c.name, f"{self.contacts[k]} {word}"))
-        said = [
-            f"{name}: {event} first, after {1e3 * travel:.1f} mm"
-            if 0 <= travel <= self._span
-            else f"{name}: {event} already"
-            if travel < 0
-            else f"{name}: no contact tips or unloads"
-            for travel, name, event in sorted(found, reverse=True)
-        ]
+            far = float(travel[k])
+            reach[c.name] = (far if far <= self._span else math.inf, f"{self.contacts[k]} {word}")
+        said = []
+        for names in ranked(reach):
+            travel, event = reach[names[0]]
+            what = (
+                "no contact tips or unloads"
+                if math.isinf(travel)
+                else f"{event} {'already' if travel < 0 else 'first'}"
+            )
+            after = f", after {1e3 * travel:.1f} mm" if 0 <= travel < math.inf else ""
+            said.append(f"{listed(names)}{' equally' * (len(names) > 1)}: {what}{after}")
         return "; ".join(said)
 
 

@@ -2,6 +2,10 @@
 
 Functions take results (a `Sweep`, a `Recording`, a `Design`, what `cop_sensitivity` gives) and
 return Axes, or a Figure where they draw several. They open no window and keep no global state.
+
+`ax`, or `axes` where a function draws several panels, are the caller's Axes to draw in: the rest of
+their figure stays as it is, and a legend there is added to. `label` and `color` tell sweeps apart
+that are drawn into the same Axes. Notebooks show the figures (of Axes, `ax.figure`).
 """
 
 from __future__ import annotations
@@ -25,6 +29,7 @@ from copsense.plots.log_plots import plot_log
 from copsense.plots.map_plots import plot_map
 from copsense.plots.push_plots import plot_pushes
 from copsense.plots.recording_plots import plot_rollout
+from copsense.plots.robot_plots import plot_robot
 from copsense.plots.saving import lay_out, render_figure, save_figure
 from copsense.plots.sole_plots import plot_soles
 from copsense.plots.stance_plots import plot_stance
@@ -45,6 +50,7 @@ __all__ = [
     "plot_pushes",
     "plot_regions",
     "plot_results",
+    "plot_robot",
     "plot_rollout",
     "plot_sensitivity",
     "plot_soles",

@@ -23,16 +23,25 @@ from copsense.plots.style import (
     MUTED,
     OFF_SOLE,
     SOLE,
+    Color,
     add_legend,
     axes_or_new,
-    colours,
+    looks,
     styled,
 )
 from copsense.sweeps import Sweep
 
 
 @styled
-def plot_cop(sweep: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_cop(
+    sweep: Sweep,
+    *,
+    axis: str = "y",
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+    legend: bool = True,
+) -> Axes:
     """Draw where each CoP is in the world while the path is followed.
 
     Each sole is a band between its two edges; the line is dotted where a CoP is off its sole or its
@@ -42,12 +51,15 @@ def plot_cop(sweep: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: b
         sweep: the sweep.
         axis: ``"x"`` or ``"y"`` of the world.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
         legend: whether to add a legend of the criteria.
     """
     ax = axes_or_new(ax)
     x, index = abscissa(sweep), "xy".index(axis)
     names, contacts = labels(sweep, "criterion"), labels(sweep, "contact")
-    colour, cops, good = colours(names), world_cops(sweep)[..., index], sweep.planted.values
+    look = looks(names, color, label)
+    colour, cops, good = look.colour, world_cops(sweep)[..., index], sweep.planted.values
     pulling = sweep["pulling"].values.astype(bool)
     _draw_edges(ax, sweep, axis, contacts)
     com = sweep["com"].sel(com_axis=axis).values * MM
@@ -62,6 +74,7 @@ def plot_cop(sweep: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: b
                 x.values,
                 np.where(good[:, j, k], line, np.nan),
                 color=colour[name],
+                label=None if k else look.words[name],
                 **marks(sweep),
             )
     mark_failed(ax, sweep, colour)
@@ -72,7 +85,7 @@ def plot_cop(sweep: Sweep, *, axis: str = "y", ax: Axes | None = None, legend: b
         com_line = Line2D([], [], label="CoM", **COM_LINE)
         off = Line2D([], [], color=MUTED, label="off its sole", **OFF_SOLE)
         extra = [com_line] if np.all(good | sweep.failed.values[..., None]) else [com_line, off]
-        add_legend(ax, colour, extra=extra)
+        add_legend(ax, look.legend, extra=extra)
     return ax
 
 
@@ -84,6 +97,8 @@ def plot_foot_cop(
     axis: str = "y",
     against: str | None = None,
     ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
 ) -> Axes:
     """Draw one contact's CoP in its own axes, with the sole's edges as dotted lines.
 
@@ -93,22 +108,24 @@ def plot_foot_cop(
         axis: ``"x"`` or ``"y"`` of the contact.
         against: a coordinate over postures to have along the horizontal axis; default the path's.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     ax = axes_or_new(ax)
     x, names = abscissa(sweep, against), labels(sweep, "criterion")
-    colour, k = colours(names), labels(sweep, "contact").index(contact)
+    look, k = looks(names, color, label), labels(sweep, "contact").index(contact)
     found = edges(sweep, axis)[k]
     for edge in found or ():
         place = edge - contact_origins(sweep)[k]["xy".index(axis)]
         ax.axhline(place, **EDGE_LINE)
     for name in names:
         cop = sweep["cop"].sel(criterion=name, contact=contact, axis=axis).values * MM
-        ax.plot(x.values, cop, color=colour[name], **marks(sweep))
-    mark_failed(ax, sweep, colour, against)
+        ax.plot(x.values, cop, color=look.colour[name], label=look.words[name], **marks(sweep))
+    mark_failed(ax, sweep, look.colour, against)
     ax.set_xlabel(x.label)
     ax.set_ylabel(f"CoP {axis} of {contact} [mm]")
     edge_line = Line2D([], [], label="edge of the sole", **EDGE_LINE)
-    add_legend(ax, colour, extra=[edge_line] if found else [])
+    add_legend(ax, look.legend, extra=[edge_line] if found else [])
     return ax
 
 

@@ -10,20 +10,25 @@ from matplotlib.figure import Figure
 
 from copsense.design import Design, Score, pareto
 from copsense.plots.reading import MM
-from copsense.plots.style import INK, MUTED, colours, new_figure, styled
+from copsense.plots.style import INK, MUTED, Panels, axes_or_pair, colours, styled, whole_figure
 
 _ALL = "candidates"
 
 
 @styled
-def plot_design(design: Design) -> Figure:
+def plot_design(design: Design, *, axes: Panels | None = None) -> Figure:
     """Draw every candidate's CoM gain and CoM travel against its torque norm.
 
     The line joins the Pareto set: candidates that no other beats in both. The paper's two criteria
     and the designed one stand beside them.
+
+    Args:
+        design: what was designed.
+        axes: where to draw the gain and the travel, without a legend around them: their lines are
+            labelled for one; default a new figure.
     """
-    figure = new_figure(9.2, 4.2)
-    gain, travel = figure.subplots(1, 2)
+    gain, travel = axes_or_pair(axes, ("the gain", "the travel"), 9.2, 4.2)
+    figure = whole_figure(gain)
     _draw(gain, design, lambda s: s.worst_gain, 1.0)
     _draw(travel, design, lambda s: s.travel * MM, -1.0)
     gain.set_ylabel("largest |dCoP/dCoM| [m/m]")
@@ -33,6 +38,8 @@ def plot_design(design: Design) -> Figure:
     near = f"within {design.score.range * MM:.0f} mm of the middle"
     for ax in (gain, travel):
         ax.set_xlabel(f"torque norm [N m], rms {near}")
+    if axes is not None:
+        return figure
     handles, names = gain.get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names))
     return figure

@@ -20,12 +20,16 @@ from copsense.plots.style import (
     INK,
     LIMIT_LINE,
     MUTED,
+    Panels,
     add_legend,
     axes_or_new,
+    axes_or_pair,
     colours,
+    given_axes,
     line_styles,
     new_figure,
     styled,
+    whole_figure,
 )
 from copsense.regions import ComRegion
 from copsense.sweeps import Sweep
@@ -36,15 +40,20 @@ _DEGENERATE = 3  # vertices: a region with fewer has no area
 
 
 @styled
-def plot_limited(sweep: Sweep, binding: Mapping[str, Sequence[float]]) -> Figure:
+def plot_limited(
+    sweep: Sweep,
+    binding: Mapping[str, Sequence[float]],
+    *,
+    axes: Panels | None = None,
+) -> Figure:
     """Draw a sweep within limits: each CoP, and its slope with the jumps where a limit binds.
 
     Args:
         sweep: a lateral sweep evaluated with limits.
         binding: criterion -> CoM y at which its first limit binds, to either side [m].
+        axes: where to draw the CoPs and their slopes; default a new figure.
     """
-    figure = new_figure(9.2, 3.9)
-    left, right = figure.subplots(1, 2)
+    left, right = axes_or_pair(axes, ("the CoPs", "their slopes"), 9.2, 3.9)
     plot_cop(sweep, ax=left, legend=False)
     x, names = abscissa(sweep), labels(sweep, "criterion")
     contacts, colour = labels(sweep, "contact"), colours(names)
@@ -66,7 +75,7 @@ def plot_limited(sweep: Sweep, binding: Mapping[str, Sequence[float]]) -> Figure
     right.set_xlabel(x.label)
     right.set_ylabel("slope of CoP y along the path [m/m]")
     add_legend(right, colour, styles)
-    return figure
+    return whole_figure(left)
 
 
 @styled
@@ -121,9 +130,7 @@ def plot_regions(
 
 
 @styled
-def plot_limit_margins(
-    sweep: Sweep, *, axes: Sequence[Axes] | None = None, legend: bool = True
-) -> Figure:
+def plot_limit_margins(sweep: Sweep, *, axes: Panels | None = None, legend: bool = True) -> Figure:
     """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
 
     Args:
@@ -134,6 +141,7 @@ def plot_limit_margins(
     kinds = limit_kinds(sweep)
     if axes is None:
         axes = new_figure(max(2.9 * len(kinds), 4.2), 3.0).subplots(1, len(kinds), squeeze=False)[0]
+    axes = given_axes(axes, kinds)
     x, names = abscissa(sweep), labels(sweep, "criterion")
     colour = colours(names)
     for ax, kind in zip(axes, kinds, strict=True):
@@ -152,7 +160,7 @@ def plot_limit_margins(
         ax.set_ylabel(f"smallest margin [{unit}]")
     if legend:
         add_legend(axes[0], colour)
-    return axes[0].figure  # type: ignore[return-value]
+    return whole_figure(axes[0])
 
 
 def limit_kinds(sweep: Sweep) -> list[str]:

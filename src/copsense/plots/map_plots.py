@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from copsense.errors import InvalidInputError
 from copsense.maps.marginals import Marginal
 from copsense.plots.reading import MM
+from copsense.plots.robot_plots import draw_bones
 from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
 
 # quantity -> (words, unit shown, factor)
@@ -136,8 +137,7 @@ def _say(ax: Axes, words: str) -> None:
 def _draw_postures(ax: Axes, name: str, skeletons: Sequence[np.ndarray]) -> None:
     """Skeletons in the frontal plane, seen by someone in front of the robot."""
     for lines, shade in zip(skeletons[: len(_SHADES)], _SHADES, strict=False):
-        for segment in lines:
-            ax.plot(segment[:, 1], segment[:, 2], color=INK, alpha=shade, linewidth=1.6)
+        draw_bones(ax, lines, 1, shade)
     if not skeletons:
         _say(ax, "none")
     ax.axhline(0.0, color=MUTED, linewidth=COM_LINE["linewidth"])

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from copsense.criterion import Criterion
 from copsense.labelled import LabelledResult
 from copsense.polygon import Polygon, unpadded
+from copsense.statics import WrenchPolicy
 
 MM, DEG = 1e3, 180.0 / np.pi
 _AXES = {"x": 0, "y": 1}
@@ -45,6 +47,11 @@ def abscissa(result: LabelledResult, name: str | None = None) -> Abscissa:
 def labels(result: LabelledResult, dimension: str) -> list[str]:
     """The names along a dimension."""
     return [str(name) for name in np.atleast_1d(result[dimension].values)]
+
+
+def criterion_name(policy: Criterion | WrenchPolicy) -> str:
+    """What a figure calls a criterion or a policy."""
+    return policy.name if isinstance(policy, Criterion) else policy.__name__
 
 
 def world_cops(result: LabelledResult) -> Float[np.ndarray, "N criterion contact 2"]:

@@ -1,4 +1,4 @@
-"""plot_stance: one posture from above, and where its CoPs go when its CoM moves."""
+"""plot_stance: one posture, and where its CoPs go when its CoM moves."""
 
 from __future__ import annotations
 
@@ -10,33 +10,51 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
-from copsense.plots.reading import MM
+from copsense.plots.reading import MM, criterion_name
+from copsense.plots.robot_plots import RING, SIDES, plot_robot
 from copsense.plots.sole_plots import draw_ground, frame_ground
-from copsense.plots.style import INK, new_figure, styled
+from copsense.plots.style import (
+    INK,
+    MUTED,
+    Panels,
+    colours,
+    given_axes,
+    new_figure,
+    styled,
+    whole_figure,
+)
 from copsense.sensitivity import CopSensitivity
+from copsense.skeleton import skeleton
 from copsense.stance import Stance
-from copsense.statics import WrenchPolicy
 
 _STEP = 20.0  # mm that the CoM moves for the arrows
+_FLATTEST = 0.6  # height of what is drawn from above, by its width
 _FORWARD, _LEFT = "#009E73", "#CC79A7"
 
 
 @styled
-def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figure:
-    """Draw a stance from above: soles, CoPs, CoM, and how the CoPs move when the CoM does.
+def plot_stance(
+    stance: Stance,
+    sensitivities: Sequence[CopSensitivity],
+    *,
+    axes: Panels | None = None,
+) -> Figure:
+    """Draw a stance: the robot from behind and from its right, and each criterion from above.
 
-    From each CoP an arrow goes to where, to first order, it would be with the CoM 20 mm farther
-    forward, and one for 20 mm to the left. Beside each contact stand its share of the weight and
-    how far the CoM may move before the contact tips or unloads.
+    From above, from each CoP an arrow goes to where, to first order, it would be with the CoM 20 mm
+    farther forward, and one for 20 mm to the left. Beside each contact stand its share of the
+    weight and how far the CoM may move before the contact tips or unloads.
 
     Args:
         stance: the stance.
         sensitivities: of that stance, one per criterion, at least one.
+        axes: where to draw the criteria from above, one for each, without the robot (`plot_robot`
+            draws it) and without a legend; default a new figure of both.
 
     Raises:
-        InvalidInputError: there is no sensitivity, or one has another number of contacts.
+        InvalidInputError: there is no sensitivity, or one has another number of contacts; other
+            than one of `axes` for each.
     """
     if not sensitivities or any(len(s.cop) != len(stance.contacts) for s in sensitivities):
         raise InvalidInputError(
@@ -52,26 +70,48 @@ def plot_stance(stance: Stance, sensitivities: Sequence[CopSensitivity]) -> Figu
         for k, contact in enumerate(stance.contacts)
     ]
     com = stance.com[:2] * MM
-    figure = new_figure(max(4.1 * len(sensitivities), 5.0), 5.0)
-    panels = figure.subplots(1, len(sensitivities), sharey=True, squeeze=False)[0]
-    axes = [place.rotation[:2, :2] for place in places]
-    drawn = [_Drawn(s, origins, axes) for s in sensitivities]
+    names = [criterion_name(s.equilibrium.criterion) for s in sensitivities]
+    colour = colours(names)
+    if axes is None:
+        figure, panels = _with_robot(stance, sensitivities)
+    else:
+        panels = given_axes(axes, names)
+        figure = whole_figure(panels[0])
+    turned = [place.rotation[:2, :2] for place in places]
+    drawn = [_Drawn(s, origins, turned) for s in sensitivities]
     reach = np.vstack([com, *[d.points() for d in drawn]])
-    for ax, result in zip(panels, drawn, strict=True):
+    for ax, result, name in zip(panels, drawn, names, strict=True):
         draw_ground(ax, soles, origins)
-        _draw_arrows(ax, result)
+        _draw_arrows(ax, result, colour[name])
         ax.plot(com[1], com[0], "+", color=INK, markersize=13, markeredgewidth=2, zorder=6)
         frame_ground(ax, soles, origins, reach)
         _write_loads(ax, stance, result.result, soles, origins)
-        ax.set_title(_name(result.result.equilibrium.criterion))
+        ax.set_title(name, color=colour[name])
     for ax in panels[1:]:
         ax.set_ylabel("")
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=4)
     return figure
 
 
-def _name(criterion: Criterion | WrenchPolicy) -> str:
-    return criterion.name if isinstance(criterion, Criterion) else criterion.__name__
+def _with_robot(
+    stance: Stance, sensitivities: Sequence[CopSensitivity]
+) -> tuple[Figure, list[Axes]]:
+    """A figure with the robot on its left; the panels that are still to be drawn."""
+    across, along, height = np.ptp(skeleton(stance).reshape(-1, 3), axis=0)
+    tall = height > max(across, along)
+    robot = [1.9, 1.9] if tall else [3.0]
+    widths = [*robot, *[4.1] * len(sensitivities)]
+    figure = new_figure(sum(widths) + 0.5, 5.0)
+    grid = figure.add_gridspec(2, len(widths), width_ratios=widths)
+    for k, side in enumerate(SIDES):
+        ax = figure.add_subplot(grid[:, k] if tall else grid[k, 0])
+        plot_robot(stance, sensitivities, side=side, ax=ax, legend=False)
+        if tall and k:
+            ax.set_ylabel("")
+    above: list[Axes] = []
+    for column in range(len(robot), len(widths)):
+        above.append(figure.add_subplot(grid[:, column], sharey=above[0] if above else None))
+    figure.legend(handles=_handles(), loc="outside lower center", ncols=5)
+    return figure, above
 
 
 class _Drawn:
@@ -92,7 +132,7 @@ class _Drawn:
         return np.vstack([self.cops, *(self.cops + self.moves[:, :, j] for j in (0, 1))])
 
 
-def _draw_arrows(ax: Axes, drawn: _Drawn) -> None:
+def _draw_arrows(ax: Axes, drawn: _Drawn, dot: str) -> None:
     for cop, moves in zip(drawn.cops, drawn.moves, strict=True):
         for j, colour in enumerate((_FORWARD, _LEFT)):
             tip = cop + moves[:, j]
@@ -111,7 +151,7 @@ def _draw_arrows(ax: Axes, drawn: _Drawn) -> None:
                     },
                     zorder=4,
                 )
-        ax.plot(cop[1], cop[0], "o", color=INK, markersize=6, zorder=5)
+        ax.plot(cop[1], cop[0], "o", color=dot, markersize=7, zorder=5)
 
 
 def _write_loads(
@@ -131,7 +171,7 @@ def _write_loads(
             (result.unloading_travel[k], "unloads after"),
         ):
             if math.isfinite(travel) and not (event == "unloads after" and soles[k] is not None):
-                lines.append("is off its sole" if travel < 0 else f"{event} {travel * MM:.0f} mm")
+                lines.append("is off its sole" if travel < 0 else f"{event} {_length(travel)}")
         sole, ahead = soles[k], origins[k, 0] >= front - 1.0
         edge = origins[k, 0] if sole is None else sole[:, 0].max() if ahead else sole[:, 0].min()
         middle = origins[k, 1] if sole is None else (sole[:, 1].min() + sole[:, 1].max()) / 2
@@ -153,6 +193,15 @@ def _write_loads(
     if all(sole is None for sole in soles):
         left, right = ax.get_xlim()
         ax.set_xlim(left + 0.3 * (left - right), right - 0.3 * (left - right))
+    low, high = ax.get_ylim()
+    left, right = ax.get_xlim()
+    thin = max(_FLATTEST * (left - right) - (high - low), 0.0)  # feet in a line: no room for words
+    ax.set_ylim(low - thin / 2, high + thin / 2)
+
+
+def _length(travel: float) -> str:
+    """In mm, or in m where that would be longer than it is exact."""
+    return f"{travel:.1f} m" if travel >= 1.0 else f"{travel * MM:.0f} mm"
 
 
 def _handles() -> list[Line2D]:
@@ -160,8 +209,9 @@ def _handles() -> list[Line2D]:
         return Line2D([], [], color=colour, linewidth=2.0, marker=9, markersize=7, label=words)
 
     return [
-        Line2D([], [], color=INK, marker="o", linestyle="none", label="CoP"),
+        Line2D([], [], color=MUTED, marker="o", linestyle="none", label="CoP"),
         Line2D([], [], color=INK, marker="+", markersize=11, linestyle="none", label="CoM"),
+        Line2D([], [], label="CoM on the ground", **RING),
         arrow(_FORWARD, f"CoP if the CoM goes {_STEP:.0f} mm forward"),
         arrow(_LEFT, f"{_STEP:.0f} mm to the left"),
     ]

@@ -7,15 +7,23 @@ contact.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure as Figure  # for modules that do not import matplotlib
 from matplotlib.lines import Line2D
 
+from copsense.errors import InvalidInputError
+from copsense.plots.saving import render_figure
+
+Color: TypeAlias = str | Mapping[str, str] | None
+Panels: TypeAlias = Sequence[Axes] | np.ndarray  # as subplots gives them
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -32,6 +40,7 @@ _KNOWN = {
 _OTHERS = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#8C6D31", "#000000")
 _STYLES: tuple[Any, ...] = ("-", (0, (4.5, 1.8)), (0, (1.2, 1.4)), (0, (5, 1.4, 1.2, 1.4)))
 
+_NOTEBOOK_DPI = 90.0
 _LETTERS, _HANDLE = 15.0, 6  # letters per inch of a legend; letters that a handle takes
 
 _RC = {
@@ -83,14 +92,127 @@ def styled(plot: Callable[P, R]) -> Callable[P, R]:
     return draw
 
 
+class NotebookFigure(Figure):
+    """A figure that notebooks show, though pyplot does not know it."""
+
+    def _repr_png_(self) -> bytes:
+        return render_figure(self, ".png", dpi=_NOTEBOOK_DPI)
+
+
 def new_figure(width: float, height: float) -> Figure:
     """A figure [inches] without a window, unknown to pyplot."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
-def axes_or_new(ax: Axes | None, width: float = 4.9, height: float = 3.6) -> Axes:
-    """The axes given, or those of a new figure."""
-    return new_figure(width, height).add_subplot() if ax is None else ax
+def axes_or_new(ax: Any, width: float = 4.9, height: float = 3.6) -> Axes:
+    """The axes given, or those of a new figure.
+
+    Raises:
+        InvalidInputError: what is given is not one Matplotlib Axes.
+    """
+    if ax is None:
+        return new_figure(width, height).add_subplot()
+    if not isinstance(ax, Axes):
+        raise InvalidInputError(
+            f"ax is one Matplotlib Axes, not a {type(ax).__name__}: of several, give one, such as "
+            "axes[0]."
+        )
+    return ax
+
+
+def given_axes(axes: Any, needed: Sequence[str]) -> list[Axes]:
+    """The axes given, one for each of what is drawn; an array of them in its order.
+
+    Args:
+        axes: Matplotlib Axes, in any sequence or array.
+        needed: what is drawn, panel by panel, in words.
+
+    Raises:
+        InvalidInputError: they are too few or too many, or something else.
+    """
+    found = list(np.ravel(np.array(axes, dtype=object)))
+    if len(found) != len(needed) or not all(isinstance(ax, Axes) for ax in found):
+        others = [ax for ax in found if not isinstance(ax, Axes)]
+        given = f"a {type(others[0]).__name__}" if others else f"{len(found)}"
+        raise InvalidInputError(
+            f"axes are {len(needed)} Matplotlib Axes, one for each of {', '.join(needed)}; given: "
+            f"{given}. Make them with figure.subplots(1, {len(needed)}), or leave axes out."
+        )
+    return found
+
+
+def axes_or_pair(
+    axes: Any,
+    needed: tuple[str, str],
+    width: float,
+    height: float,
+    widths: tuple[float, float] | None = None,
+) -> list[Axes]:
+    """The two axes given, or those of a new figure [inches], side by side."""
+    if axes is not None:
+        return given_axes(axes, needed)
+    return list(new_figure(width, height).subplots(1, 2, width_ratios=widths))
+
+
+def whole_figure(ax: Axes) -> Figure:
+    """The figure that axes are in, around any subfigure."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return figure
+
+
+@dataclass(frozen=True)
+class Looks:
+    """How criteria look in one figure.
+
+    Attributes:
+        colour: of each.
+        words: of each in a legend.
+    """
+
+    colour: dict[str, str]
+    words: dict[str, str]
+
+    @property
+    def legend(self) -> dict[str, str]:
+        """Words -> colour."""
+        return {self.words[name]: shade for name, shade in self.colour.items()}
+
+
+def looks(names: Sequence[str], color: Color = None, label: str | None = None) -> Looks:
+    """The looks of criteria, those asked for where they are.
+
+    Args:
+        names: of the criteria.
+        color: one colour for a single criterion, or criterion -> colour; the others keep theirs.
+        label: what a legend says, before the criterion's name where there are several.
+
+    Raises:
+        InvalidInputError: no colour, one colour for several criteria, or one of no criterion here.
+    """
+    asked: Mapping[str, str] = {}
+    if isinstance(color, Mapping):
+        asked = color
+    elif color is not None:
+        if len(names) > 1:
+            raise InvalidInputError(
+                f"one color for {len(names)} criteria would make them look alike: give "
+                f"color={{{names[0]!r}: {color!r}}}, or draw one, sweep.subset([{names[0]!r}])."
+            )
+        asked = {names[0]: color}
+    for name, shade in asked.items():
+        if name not in names:
+            raise InvalidInputError(
+                f"color names {name!r}, which is not drawn. Choose from {', '.join(names)}."
+            )
+        if not is_color_like(shade):
+            raise InvalidInputError(
+                f"{shade!r} is not a color of Matplotlib: give a name such as 'black'."
+            )
+    words = {name: name for name in names}
+    if label is not None:
+        words = {name: label if len(names) == 1 else f"{label}, {name}" for name in names}
+    return Looks(colours(names) | dict(asked), words)
 
 
 def colours(criteria: Iterable[str]) -> dict[str, str]:
@@ -128,7 +250,15 @@ def add_legend(
 
 
 def put_legend(ax: Axes, handles: Sequence[Line2D]) -> None:
-    """A legend over the axes, where it hides no line, in as many rows as it needs."""
+    """A legend over the axes, where it hides no line, in as many rows as it needs.
+
+    What a legend that is there already explains, it explains too.
+    """
+    before = ax.get_legend()
+    if before is not None:
+        mine = {str(handle.get_label()) for handle in handles}
+        kept = [h for h in before.legend_handles if h is not None]
+        handles = [*(h for h in kept if str(h.get_label()) not in mine), *handles]  # type: ignore[list-item]
     width = ax.get_figure(root=True).get_figwidth() * ax.get_position().width  # type: ignore[union-attr]
     needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
     rows = math.ceil(needed / (_LETTERS * width))
