@@ -148,8 +148,8 @@ def test_times_in_milliseconds(tmp_path, icub, made):
 def test_a_log_too_large_at_100_hertz_is_thinned_further(tmp_path, icub, monkeypatch):
     monkeypatch.setattr(collecting, "LARGEST", 3 * ROWS)
     log = read_table(tmp_path / "log.csv", icub, columns())
-    assert log.step == pytest.approx(0.1)
-    assert any("read at 10 Hz" in note for note in log.notes)
+    assert log.step == pytest.approx(0.05)
+    assert any("read at 20 Hz" in note for note in log.notes)
     monkeypatch.setattr(collecting, "LARGEST", 3)
     message = error_of(lambda: read_table(tmp_path / "log.csv", icub, columns()), LogReadError)
     assert "cut the log" in message

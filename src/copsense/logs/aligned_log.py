@@ -255,7 +255,7 @@ def _compared(
         if every > finest:
             every, rows = finest, rows[: postures * finest]
         notes.append(
-            f"every {every}th of {len(rows)} rows was evaluated"
+            f"one in {every} of {len(rows)} rows was evaluated"
             + (
                 f", the first of {whole}: rows farther apart would not show a sway of "
                 f"{frequency:.3g} Hz. More are evaluated with postures= (--postures)"

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from copsense.errors import LogReadError
 from copsense.logs.channel import LogFile, Progress
 
-LARGEST = 6_000_000  # numbers that are kept in memory: 48 MB, of which there will be copies
+LARGEST = 5_000_000  # numbers that are kept in memory: 40 MB, of which there will be copies
 
 
 def collect(

@@ -45,8 +45,8 @@ def read_log(
             names of the signals say.
         robot: whose log it is; tells columns by the names of its joints, and which joints slide.
         contacts: names of the contacts that the force sensors serve.
-        rate: rows a second, each the mean of the samples around it [Hz]; default all rows, or 100
-            or 10 Hz where these are too many for memory.
+        rate: rows a second, each the mean of the samples around it [Hz]; default all rows, or
+            100, 20 or 5 Hz where these are too many for memory.
         advance: called with the bytes read, for a progress bar.
 
     Raises:

@@ -16,7 +16,7 @@ from copsense.logs.log_map import TIME_UNITS
 from copsense.logs.one_clock import Clock, on_clock, ordered
 from copsense.logs.selection import Column, one_column
 
-_THINNED = (100.0, 10.0)  # Hz, one after the other, where a log is too large for memory
+_THINNED = (100.0, 20.0, 5.0)  # Hz, one after the other, where a log is too large for memory
 _ROWS_OF_FILE = ""  # the clock of a file that has none
 
 
@@ -49,8 +49,8 @@ class Signals:
         """Read what is wanted.
 
         Args:
-            rate: rows a second, each the mean of the samples around it; None for all, or 100 or
-                10 Hz where these are too many for memory.
+            rate: rows a second, each the mean of the samples around it; None for all, or 100,
+                20 or 5 Hz where these are too many for memory.
             advance: called with the bytes read.
         """
         if rate is not None and _ROWS_OF_FILE in self._clock_of.values():
