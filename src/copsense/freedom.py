@@ -102,7 +102,7 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
 
 def freedom_notes(stance: Stance) -> tuple[str, ...]:
     """What the contacts hold twice, or hold that one would expect to move; empty where nothing."""
-    rows, repeated = len(stance.constraints), (*closure_notes(stance), *hanging_notes(stance))
+    rows, repeated = len(stance.constraints), (*repetition_notes(stance), *hanging_notes(stance))
     if stance.rank == rows:
         return repeated
     held = [f"CoM's {'xyz'[axis]}" for axis in held_com_axes(stance) if axis < 2]
@@ -116,14 +116,12 @@ def freedom_notes(stance: Stance) -> tuple[str, ...]:
     )
 
 
-def closure_notes(stance: Stance) -> tuple[str, ...]:
-    """Whether loops and couplings all but repeat what the contacts hold; empty where they do not.
+def repetition_notes(stance: Stance) -> tuple[str, ...]:
+    """Whether contacts, loops and couplings all but repeat each other; empty where they do not.
 
     What repeats it exactly counts as held twice; what nearly does carries forces that rigid statics
     tell, and that nothing real, or simulated, shares so.
     """
-    if stance.closures is None:
-        return ()
     sizes = np.linalg.svd(stance.constraints, compute_uv=False)
     least = float(sizes[sizes > RANK_TOLERANCE].min(initial=np.inf))
     if least > _ALIKE:
@@ -134,10 +132,11 @@ def closure_notes(stance: Stance) -> tuple[str, ...]:
         what = "The contacts all but repeat what they hold themselves"
     else:
         what = "Loops and couplings all but repeat what the contacts hold"
+    lacks = "".join(f" {clause[0].upper()}{clause[1:]}." for clause in missing_joints(stance))
     return (
         f"{what} (smallest singular value "
         f"{least:.1e}): links and ground that yield by a little share the forces between them "
-        "otherwise than these rigid ones, and feet may creep.",
+        f"otherwise than these rigid ones, and feet may creep.{lacks}",
     )
 
 

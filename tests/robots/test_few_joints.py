@@ -12,7 +12,7 @@ import copsense
 from copsense.batch import PostureChart
 from copsense.errors import InsufficientContactsError, UnreachablePostureError
 from copsense.freedom import freedom_notes, held_com_axes, missing_joints
-from copsense.posture import retract
+from copsense.posture import retract, solve_posture
 from copsense.robots import StandingWarning
 
 WRENCH = copsense.minimum_wrench(1.0)
@@ -49,6 +49,14 @@ def test_legs_of_six_joints_lack_nothing():
     assert missing_joints(full) == freedom_notes(full) == ()
     assert full.false_motions.shape == (full.robot.model.nv, 0)
     assert held_com_axes(full) == ()
+
+
+def test_contacts_that_nearly_repeat_each_other_are_doubted():
+    without_yaw = stand(FULL[1:])
+    aside = solve_posture(without_yaw, com=(None, 0.02, None)).stance
+    (note,) = freedom_notes(aside)
+    assert note.startswith("The contacts all but repeat what they hold themselves")
+    assert note.endswith("none about z (yaw).")
 
 
 def test_what_legs_without_ankle_roll_leave_are_the_planar_motions_of_the_trunk(five):

@@ -20,7 +20,7 @@ from copsense.controllers import (
 )
 from copsense.criterion import Criterion, check_criterion, minimum_torque
 from copsense.errors import InvalidInputError
-from copsense.freedom import closure_notes, hanging_notes
+from copsense.freedom import hanging_notes, repetition_notes
 from copsense.limits import Limits, check_limits
 from copsense.simulation.control_loop import rollout
 from copsense.simulation.mujoco_simulator import MujocoSimulator
@@ -124,7 +124,7 @@ def balance(
         notes = (*notes, prediction.at_rest)
     timed = () if prediction is None else filter(None, (timed_note(path),))
     recording = recording.with_notes(
-        (*notes, *timed, *closure_notes(stance), *hanging_notes(stance))
+        (*notes, *timed, *repetition_notes(stance), *hanging_notes(stance))
     )
     return recording if prediction is None else prediction.attach(recording)
 
