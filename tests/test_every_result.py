@@ -29,6 +29,7 @@ INTERNAL = (
     "copsense.mjcf",
     "copsense.paper",
     "copsense.plots.reading",
+    "copsense.plots.style",
     "copsense.quadratic",
     "copsense.robots.stance_file",  # a file that is being read
     "copsense.statics.tied_optimum",

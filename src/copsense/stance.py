@@ -365,7 +365,7 @@ class Stance:
     @property
     def hanging_balance(self) -> Float[np.ndarray, " h"]:
         """u' N along `hanging_motions`: zero at rest [Nm, N, per unit of motion]."""
-        return np.asarray(self.hanging_motions.T.dot(self.balance))
+        return read_only(self.hanging_motions.T.dot(self.balance))
 
     @property
     def hanging_derivative(self) -> Float[np.ndarray, "h nv"]:

@@ -120,7 +120,8 @@ def test_the_table_has_a_row_per_criterion_and_contact(analysis):
 
 
 def test_it_draws_the_stance(analysis):
-    assert len(analysis.plot().axes) == 2
+    titles = [axes.get_title(loc="left").split(":")[0] for axes in analysis.plot().axes]
+    assert titles == ["from behind", "from its right", *analysis.sensitivities]
 
 
 def test_a_point_contact_has_no_margin_and_no_tipping_edge(stance_of):

@@ -100,7 +100,7 @@ def test_the_report_shows_the_closed_loop(sway, tmp_path, monkeypatch):
     assert 'id="closed-loop"' in page
     assert 'href="#closed-loop"' in page
     assert "r_sole tips at" in page
-    for told in ("31.1 mm", "41.1 mm", "32.1 mm", "32.2 mm", "Slow leans", "No hardware data"):
+    for told in ("31.1 mm", "41.1 mm", "32.1 mm", "32.2 mm", "Slow leans", "A real iCub"):
         assert told in page, told
     assert [row["rank"] for row in score_rows(table)] == ["2", "1"]
     rows = {row["name"]: row for row in sway_runs(sway)}

@@ -111,11 +111,11 @@ def test_every_erratum_reference_value_and_version_is_on_the_page(
     page, text, reproduction, command
 ):
     words = " ".join("".join(page.text["body"]).split())
-    assert len(page.all("table")) == 5
+    assert len(page.all("table")) == 6
     cells = sum(tag == "tr" for tag, _ in page.tags)
     bindings = reproduction.within_limits.bindings
-    rows = (reproduction.claims, reproduction.errata, reproduction.references, bindings)
-    assert cells == 5 + sum(len(r) for r in rows)
+    rows = (reproduction.claims, reproduction.errata, reproduction.references, bindings, RECORDED)
+    assert cells == 6 + sum(len(r) for r in rows)
     for name, version in reproduction.versions.items():
         assert f"<dt>{name}</dt><dd>{version}</dd>" in text
     assert "amplitude" in words
