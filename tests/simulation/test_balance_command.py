@@ -21,7 +21,7 @@ from copsense import (
     solve_equilibrium,
 )
 from copsense.drives import Coupling
-from copsense.freedom import closure_notes
+from copsense.freedom import repetition_notes
 from copsense.robots import save_stance
 from copsense.simulation import Recording
 
@@ -312,7 +312,7 @@ def test_a_coupling_that_all_but_repeats_the_contacts_is_said_to():
     said = copsense(*run, "--couple", "r_hip_yaw=-1*l_hip_yaw").err
     assert "note: Loops and couplings all but repeat what the contacts hold" in said
     drives = Drives(couplings=(Coupling("r_hip_yaw", "l_hip_yaw", 1.0),))
-    assert closure_notes(load_stance("icub", drives=drives)) == ()
+    assert repetition_notes(load_stance("icub", drives=drives)) == ()
 
 
 def test_a_stance_files_criterion_shares_the_load(tmp_path):
