@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from copsense.errors import ModelLoadError
+from copsense.listing import first_few, listed
 from copsense.sdf import sdf_faults, sdf_notes
 from copsense.urdf import urdf_faults, urdf_notes, without_namespace, xacro_left
 from copsense.written_base import take_out_base
@@ -105,9 +106,8 @@ def load_description(
             f"{known.upper()} with <{_ROOTS[known]}>"
             for known in ([language] if language else _ROOTS)
         ]
-        wanted = " and ".join(filter(None, (", ".join(starts[:-1]), starts[-1])))
         hint = f"Use load_robot or Robot.from_{found} for this one." if found else "Give such one."
-        raise ModelLoadError(f"{name} starts with <{document.tag}>, {wanted}. {hint}")
+        raise ModelLoadError(f"{name} starts with <{document.tag}>, {listed(starts)}. {hint}")
     if xacro := xacro_left(document) if found == "urdf" else ():
         raise _unexpanded(name, xacro)
     faults = list(_FAULTS[found](document))
@@ -176,9 +176,8 @@ def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
 
 
 def _unexpanded(name: str, left: tuple[str, ...]) -> ModelLoadError:
-    more = f" and {len(left) - 3} more" if len(left) > 3 else ""
     return ModelLoadError(
-        f"{name} is a xacro file that was not expanded: it holds {', '.join(left[:3])}{more}, "
+        f"{name} is a xacro file that was not expanded: it holds {first_few(left, 3)}, "
         "which no URDF parser reads. Expand it with xacro first: xacro FILE > robot.urdf."
     )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.listing import listed
 from copsense.reach import chain_lengths
 from copsense.stance import RANK_TOLERANCE, Stance
 from copsense.unheld import moved_joints
@@ -94,7 +95,7 @@ def missing_joints(stance: Stance) -> tuple[str, ...]:
             why = f"where {free} place it freely, none {' or '.join(lacks)}"
             limbs.setdefault((joints, why), []).append(contact.name)
     return tuple(
-        f"the limb{'s' * (len(names) > 1)} of {_listed(names)} "
+        f"the limb{'s' * (len(names) > 1)} of {listed(names)} "
         + (f"have {joints} each {why}" if len(names) > 1 else f"has {joints} {why}")
         for (joints, why), names in limbs.items()
     )
@@ -167,11 +168,6 @@ def _tied_joints(stance: Stance) -> set[int]:
         for i in range(2, len(joints))
         if moved[joints[i].idx_v : joints[i].idx_v + joints[i].nv].any()
     }
-
-
-def _listed(names: list[str]) -> str:
-    """Names as in a sentence: a, b and c."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _lacking(stance: Stance, contact: Contact) -> list[str]:

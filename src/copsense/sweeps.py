@@ -21,6 +21,7 @@ from copsense.extras import require
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits, check_limits
+from copsense.listing import first_few
 from copsense.path import PosturePath, check_path
 from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity
@@ -283,7 +284,7 @@ class Sweep(LabelledResult):
         """What the representation says under its heading."""
         contacts, names = self.labels("contact"), self.labels("criterion")
         unit = self.coordinate.attrs.get("units", "")
-        lines = [f"  contacts: {_listed(contacts)}"]
+        lines = [f"  contacts: {first_few(contacts, _SHOWN)}"]
         if self.period is not None:
             lines.append(f"  in a sway of {self.period:g} s")
         word, ranges = "every contact planted", self.planted_range
@@ -449,8 +450,3 @@ def _longest_run(flags: np.ndarray) -> tuple[int, int] | None:
     runs = ends.reshape(-1, 2)
     first, after = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
     return int(first), int(after) - 1
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(names[:_SHOWN]) + more

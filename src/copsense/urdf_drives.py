@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.drives import Coupling, Drives, Loop, LoopKind
+from copsense.listing import first_few
 from copsense.urdf import loop_ends
 from copsense.xml_numbers import read_numbers
 
@@ -277,6 +278,4 @@ def _numbers(element: ET.Element, attribute: str, default: str) -> tuple[float, 
 
 
 def _listed(names: Iterable[str]) -> str:
-    known = list(names)
-    more = f" and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
-    return ", ".join(known[:_LISTED]) + more
+    return first_few(names, _LISTED)

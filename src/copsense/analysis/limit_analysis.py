@@ -13,6 +13,7 @@ from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
+from copsense.listing import first_few
 from copsense.margins import LimitMargin, limit_margins
 from copsense.path import LateralPath
 from copsense.scan import PathScan
@@ -50,10 +51,9 @@ class LimitAnalysis:
 
     def __repr__(self) -> str:
         """The active limits, and the first that is met to either side."""
-        active = ", ".join(limit.name for limit in self.active[:4]) or "none"
-        more = f" and {len(self.active) - 4} more" if len(self.active) > 4 else ""
+        active = first_few((limit.name for limit in self.active), 4) or "none"
         ways = "".join(f"; CoM to {side}: {met!r}" for side, met in self.travels.items())
-        return f"LimitAnalysis(active limits: {active}{more}{ways})"
+        return f"LimitAnalysis(active limits: {active}{ways})"
 
     @property
     def pressed(self) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from copsense.listing import listed
+
 _SAME = 1e-6  # share of a travel by which two are as long: they are exact to 1e-9 m
 
 
@@ -97,11 +99,6 @@ def ranked(reach: dict[str, tuple[float, str]]) -> list[list[str]]:
             groups.append([name])
     order = list(reach)
     return [sorted(group, key=order.index) for group in groups]
-
-
-def listed(names: list[str]) -> str:
-    """Names as a sentence has them: a, b and c."""
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _others(reach: dict[str, tuple[float, str]], *told: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.analysis.asked import asked_posture, determined_criteria, placed_stance
+from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
 from copsense.batch import PostureChart, coordinate_names
@@ -26,7 +27,6 @@ from copsense.explore.view import (
     RegionView,
     View,
     criterion_view,
-    posture_notes,
     posture_parts,
 )
 from copsense.limits import Limits
@@ -198,7 +198,7 @@ class Model:
             criterion_view(name, cop_sensitivity(here, criterion, limits), limits)
             for name, criterion in chosen.items()
         )
-        notes = [*notes, *posture_notes(here)]
+        notes = [*notes, *joint_limit_notes(here)]
         return View(state, revision, criteria=said, notes=tuple(notes), **posture_parts(here))
 
     @property

@@ -10,11 +10,11 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from copsense.analysis.joint_notes import joint_limit_notes
-from copsense.analysis.verdicts import listed, ranked
+from copsense.analysis.verdicts import ranked
 from copsense.content import ShortRepr, freeze
 from copsense.explore.state import State
 from copsense.limits import Limits
+from copsense.listing import listed
 from copsense.margins import limit_margins
 from copsense.sensitivity import CopSensitivity
 from copsense.skeleton import skeleton
@@ -231,11 +231,6 @@ def posture_parts(stance: Stance) -> dict[str, Any]:
         "soles": tuple(soles),
         "torque_names": stance.robot.torque_names,
     }
-
-
-def posture_notes(stance: Stance) -> tuple[str, ...]:
-    """What to know of a posture: joints beyond their limits."""
-    return joint_limit_notes(stance)
 
 
 def criterion_view(name: str, found: CopSensitivity, limits: Limits | None) -> CriterionView:

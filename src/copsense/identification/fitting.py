@@ -20,7 +20,7 @@ from copsense.errors import CopsenseError
 from copsense.identification.families import built, weight_changes
 from copsense.identification.measurements import Measurements
 from copsense.identification.parameter_fit import Estimate, ParameterFit
-from copsense.logs.sway_fit import inflation
+from copsense.logs.sway_fit import NORMAL, inflation
 from copsense.statics.kkt import Kkt
 
 _STEPS = 12
@@ -30,7 +30,6 @@ _UNKNOWN = math.log(10.0)  # half-width of an interval, of a logarithm, from whi
 _HALVINGS = 6
 _AT_BOUND = 1e-3  # of a logarithm
 _BLOCKS = 5
-_NORMAL = 1.959964  # standard deviations of a normal number that hold 95 %
 _TINY = 1e-12
 _EXACT = 1e-3  # of its own spread: no channel is believed better than that
 _FEW = 40  # rows that a coarse grid is looked at by
@@ -242,7 +241,7 @@ def _result(
     seen = s > reach / _UNKNOWN
     covariance = (vt[seen].T / s[seen] ** 2) @ vt[seen]
     by_encoders = _by_encoders(family, u, measurements, values, X, weights, vt[seen].T)
-    half = np.hypot(reach * np.sqrt(np.diag(covariance)), _NORMAL * by_encoders)
+    half = np.hypot(reach * np.sqrt(np.diag(covariance)), NORMAL * by_encoders)
     low, high = np.log(np.array(family.bounds)).T
     estimates = {}
     for i, name in enumerate(family.parameters):

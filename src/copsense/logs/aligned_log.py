@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from copsense.contact import Contact
 from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError
+from copsense.listing import first_few
 from copsense.logs.finding import Finding
 from copsense.logs.ground_wrenches import ground_wrenches
 from copsense.logs.log import Log
@@ -194,8 +195,7 @@ def _locked(whole: Robot, model: Robot, contacts: Sequence[Contact]) -> list[str
             f"the log lacks {', '.join(missing)}, in a leg. Map every joint between the base and "
             "the contacts."
         )
-    shown = ", ".join(locked[:8]) + (f" and {len(locked) - 8} more" if len(locked) > 8 else "")
-    return [f"joints that the log has not, locked at zero: {shown}"]
+    return [f"joints that the log has not, locked at zero: {first_few(locked, 8)}"]
 
 
 def _motion(

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from copsense.errors import InvalidInputError
+from copsense.listing import first_few
 from copsense.logs.finding import Finding
 
 _EVEN = 1e-3  # of a step: times that differ less from equal steps are equal steps
@@ -171,13 +172,12 @@ def gaps(clock: Clock, what: str) -> list[Finding]:
         return []
     spans = [(float(clock.times[i]), float(clock.times[i + 1])) for i in at]
     first = float(clock.times[0])
-    shown = ", ".join(f"{b - a:.3g} s at {a - first:.4g} s" for a, b in spans[:3])
-    more = f" and {len(spans) - 3} more" if len(spans) > 3 else ""
+    shown = first_few((f"{b - a:.3g} s at {a - first:.4g} s" for a, b in spans), 3)
     return [
         Finding(
             "gap",
             what,
-            f"{what} has {len(spans)} gap(s): {shown}{more}. Rows in them count as missing.",
+            f"{what} has {len(spans)} gap(s): {shown}. Rows in them count as missing.",
             spans[0][0] - first,
             spans[-1][1] - first,
         )

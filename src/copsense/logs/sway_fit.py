@@ -21,7 +21,7 @@ LEAST = 20  # rows from which slopes are fitted
 STILL = 1e-3  # m of travel under which nothing sways
 _EXPLAINED = 0.6  # share of the travel's variance from which a sway has one frequency
 _HIGHEST = 5.0  # Hz
-_NORMAL = 1.959964  # standard deviations of a normal number that hold 95 %
+NORMAL = 1.959964  # standard deviations of a normal number that hold 95 %
 _PERIODS = 1.5  # at least as many periods
 
 
@@ -74,7 +74,7 @@ class SlopeEstimate:
 
     def widened(self, encoders: float) -> SlopeEstimate:
         """The same with a standard deviation of the encoders' in its interval, as a square."""
-        half = math.hypot(0.5 * (self.high - self.low), _NORMAL * encoders)
+        half = math.hypot(0.5 * (self.high - self.low), NORMAL * encoders)
         return replace(self, low=self.value - half, high=self.value + half, encoders=encoders)
 
     def place_of(self, other: SlopeEstimate) -> Literal["inside", "on the edge", "outside"]:

@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 
 from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
+from copsense.listing import first_few
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 _LISTED = 12  # names that a note gives at most
@@ -63,10 +64,8 @@ def left_out(mj: Any, root: int) -> tuple[str, ...]:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names, and how many more there are."""
-    known = list(names)
-    more = f" and {len(known) - _LISTED} more" if len(known) > _LISTED else ""
-    return ", ".join(known[:_LISTED]) + more
+    """Names for a note, and how many more there are."""
+    return first_few(names, _LISTED)
 
 
 def body_label(mj: Any, body: int) -> str:

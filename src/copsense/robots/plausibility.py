@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
+from copsense.listing import first_few
 from copsense.magnitudes import in_metres, in_radians
 from copsense.polygon import Polygon
 from copsense.reach import robot_reach
@@ -237,16 +238,15 @@ def _joint_notes(stance: Stance) -> list[str]:
     if not far.any():
         return []
     order = [i for i in np.argsort(-excess) if far[i]]
-    named = ", ".join(
+    named = [
         f"{robot.dof_names[i]} by "
         + (f"{excess[i] * 1e3:.0f} mm" if slides[i] else f"{np.degrees(excess[i]):.0f} deg")
-        for i in order[:_NAMED]
-    )
-    more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
+        for i in order
+    ]
     return [
-        f"Joints stand far beyond their limits ({named}{more}): {robot.name!r} cannot stand so. "
-        "Give a posture nearer to how it stands (posture=, --posture JOINT=POSITION), or other "
-        "contact frames."
+        f"Joints stand far beyond their limits ({first_few(named, _NAMED)}): "
+        f"{robot.name!r} cannot stand so. Give a posture nearer to how it stands (posture=, "
+        "--posture JOINT=POSITION), or other contact frames."
     ]
 
 

@@ -34,6 +34,7 @@ from copsense.errors import (
     UnsolvedError,
 )
 from copsense.limits import LimitRows, Limits, limit_rows
+from copsense.listing import first_few
 from copsense.load_problem import LoadProblem
 from copsense.quadratic import Quadratic
 from copsense.stance import Stance
@@ -154,9 +155,8 @@ class ConstrainedEquilibrium(StaticEquilibrium):
 
     def __repr__(self) -> str:
         """As `StaticEquilibrium`, with the active limits."""
-        active = ", ".join(limit.name for limit in self.active[:4]) or "none"
-        more = f" and {len(self.active) - 4} more" if len(self.active) > 4 else ""
-        return f"{super().__repr__()[:-1]}; active limits: {active}{more})"
+        active = first_few((limit.name for limit in self.active), 4) or "none"
+        return f"{super().__repr__()[:-1]}; active limits: {active})"
 
     @property
     def active(self) -> tuple[ActiveLimit, ...]:
