@@ -24,6 +24,16 @@ from copsense.wrench_cone import unit_cone
 _ROUNDING = 1e-9  # m
 _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
 
+# Each limit as --limits names it -> its attribute of `Limits`.
+LIMIT_NAMES = {
+    "normal-force": "normal_force",
+    "friction": "friction",
+    "sides": "friction_sides",
+    "cop-margin": "cop_margin",
+    "torsion": "torsion",
+    "torque": "torque",
+}
+
 TorqueLimits = Literal["model"] | Mapping[str, float] | float
 
 

@@ -12,33 +12,11 @@ from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import echo_json, echo_written
 from copsense.cli.stance_memory import remembered_stance, written
-from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.stance_options import read_stance, stance_options, standing_options
 from copsense.cli.units import read_coordinates, read_positions
 from copsense.errors import InvalidInputError
 
-_NOT_OF_THE_STANCE = {  # options of this command -> how many words follow each
-    "--com-x": 1,
-    "--com-y": 1,
-    "--com-z": 1,
-    "--joint": 1,
-    "--at": 1,
-    "--criterion": 1,
-    "--characteristic-length": 1,
-    "--limits": 1,
-    "--save-stance": 1,
-    "--force-stance": 0,
-    "--export": 1,
-    "--recording": 1,
-    "--force": 0,
-    "--port": 1,
-    "--host": 1,
-    "--no-browser": 0,
-    "--no-meshes": 0,
-    "--meshes": 0,
-    "--light": 0,
-    "--dark": 0,
-    "--json": 0,
-}
+_NOT_WHERE_IT_STANDS = ("limits", "save_stance", "force_stance")  # of `standing_options`
 
 
 @click.command(
@@ -224,12 +202,24 @@ def stance_words(arguments: list[str]) -> list[str]:
     Args:
         arguments: those of the command line, the command's name first.
     """
-    words, rest = [], iter(arguments[1:])
+    own, words, rest = _of_the_window(), [], iter(arguments[1:])
     for word in rest:
         option, equals, _ = word.partition("=")
-        if option in _NOT_OF_THE_STANCE:
-            for _ in range(0 if equals else _NOT_OF_THE_STANCE[option]):
+        if option in own:
+            for _ in range(0 if equals else own[option]):
                 next(rest, None)
         else:
             words.append(word)
     return words
+
+
+def _of_the_window() -> dict[str, int]:
+    """Options of this command that do not say which stance is meant -> words after each."""
+    standing = {param.name for param in click.command()(standing_options(lambda: None)).params}
+    standing -= set(_NOT_WHERE_IT_STANDS)
+    return {
+        option: 0 if param.is_flag else param.nargs
+        for param in explore.params
+        if isinstance(param, click.Option) and param.name not in standing
+        for option in param.opts
+    }

@@ -8,6 +8,7 @@ import click
 
 from copsense.cli.contact_options import contact_options, possible_frames, read_contacts
 from copsense.cli.drive_options import drive_options, read_drives
+from copsense.cli.option_lists import package_dirs_option
 from copsense.cli.printing import echo_json
 from copsense.cli.stance_options import place_at_height
 from copsense.errors import InvalidInputError
@@ -21,13 +22,7 @@ from copsense.errors import InvalidInputError
     "  copsense inspect robot.urdf --contact l_toe:point --contact r_toe:point"
 )
 @click.argument("robot")
-@click.option(
-    "--package-dir",
-    "package_dirs",
-    multiple=True,
-    type=click.Path(file_okay=False),
-    help="Folder in which package:// meshes are looked up. Repeatable.",
-)
+@package_dirs_option
 @click.option("--root", metavar="BODY", help="Body of the robot, where an MJCF holds several.")
 @contact_options
 @drive_options

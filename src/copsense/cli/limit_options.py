@@ -45,19 +45,11 @@ def limits_option(command: F) -> F:
 
 def read_limits(text: str | None) -> Limits | None:
     """The limits that ``--limits`` describes, or None."""
-    from copsense.limits import Limits
+    from copsense.limits import LIMIT_NAMES, Limits
 
     if text is None:
         file = remembered_stance()
         return None if file is None else file.limits
-    names = {
-        "normal-force": "normal_force",
-        "friction": "friction",
-        "sides": "friction_sides",
-        "cop-margin": "cop_margin",
-        "torsion": "torsion",
-        "torque": "torque",
-    }
     values: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
         name, _, value = part.partition("=")
@@ -66,11 +58,11 @@ def read_limits(text: str | None) -> Limits | None:
                 f"--limits {name} is not a limit. Leave --limits out for none at all, or switch "
                 "one off by name, such as friction=off."
             )
-        if name not in names:
-            raise UnknownNameError("limit", name, names)
-        if names[name] in values:
+        if name not in LIMIT_NAMES:
+            raise UnknownNameError("limit", name, LIMIT_NAMES)
+        if LIMIT_NAMES[name] in values:
             raise InvalidInputError(f"the limit {name} is given twice. Give it once.")
-        values[names[name]] = _limit_value(name, value)
+        values[LIMIT_NAMES[name]] = _limit_value(name, value)
     return Limits(**values)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import F, package_dirs_option, with_options
 from copsense.cli.printing import progress_bar
 
 if TYPE_CHECKING:
@@ -36,13 +36,7 @@ _OPTIONS = (
         metavar="FRAME",
         help="Contact frame; default the preset's, or those that the sensors serve. Repeatable.",
     ),
-    click.option(
-        "--package-dir",
-        "package_dirs",
-        multiple=True,
-        type=click.Path(file_okay=False),
-        help="Folder in which package:// meshes are looked up. Repeatable.",
-    ),
+    package_dirs_option,
 )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+import click
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -13,3 +15,14 @@ def with_options(options: Sequence[Callable[[Any], Any]], command: F) -> F:
     for option in reversed(options):
         command = option(command)
     return command
+
+
+def package_dirs_option(command: F) -> F:
+    """The option --package-dir."""
+    return click.option(
+        "--package-dir",
+        "package_dirs",
+        multiple=True,
+        type=click.Path(file_okay=False),
+        help="Folder in which package:// meshes are looked up. Repeatable.",
+    )(command)

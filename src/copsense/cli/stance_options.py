@@ -12,7 +12,7 @@ from copsense.cli.contact_options import contact_options, possible_frames, read_
 from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import F, package_dirs_option, with_options
 from copsense.cli.place_options import course_options, place_options, put_in_place
 from copsense.cli.printing import echo_notes
 from copsense.cli.stance_memory import remember_stance, remembered_stance, written
@@ -74,13 +74,7 @@ def standing_options(command: F, posture: Callable[[Any], Any] | None = None) ->
         ),
         click.option("--force-stance", is_flag=True, help="Overwrite that file."),
         contact_options,
-        click.option(
-            "--package-dir",
-            "package_dirs",
-            multiple=True,
-            type=click.Path(file_okay=False),
-            help="Folder in which package:// meshes are looked up. Repeatable.",
-        ),
+        package_dirs_option,
         posture or _POSTURE,
         click.option(
             "--base-yaw",

@@ -179,17 +179,13 @@ class PlayedModel(Model):
             if self.playback.axis == "time"
             else "from copsense.sweeps import Sweep as File"
         )
-        own = replace(state, coordinates={}, held=False).to_python()
-        asked = own[own.index("copsense.analyse(\n") :].split("\n", 2)
-        stance = asked[1].strip().rstrip(",")
-        head = own[: own.index("analysis = ")]
         value, number = self.playback.values[self.row], int(self.playback.rows[self.row])
         lines = (
             f"{kind}\n\n# {self.playback.axis} = {value:.6g} {self.playback.unit}\n"
-            f"q = File.load({str(self.playback.path)!r})['configuration'].values[{number}]\n"
-            f"analysis = copsense.analyse(\n    {stance}.at(q),\n{asked[2]}"
+            f"q = File.load({str(self.playback.path)!r})['configuration'].values[{number}]"
         )
-        return f"# row {number} of {self.playback.path}", head + lines
+        python = replace(state, coordinates={}, held=False).to_python(lines, ".at(q)")
+        return f"# row {number} of {self.playback.path}", python
 
 
 def frame_rows(playback: Playback, rate: float = 25.0) -> tuple[list[int], float]:

@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 from copsense.arrays import finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.limits import Limits
+from copsense.limits import LIMIT_NAMES, Limits
 from copsense.path import COM_COORDINATES
 
 _OWN: Literal["own"] = "own"
@@ -119,11 +119,15 @@ class State:
             parts += ["--limits", limits_text(self.limits)]
         return shlex.join(parts)
 
-    def to_python(self) -> str:
+    def to_python(self, before: str = "", moved: str = "") -> str:
         """The lines of Python that print the numbers of this state.
 
         A stance that takes more than a name to say is read from a file; a comment says which
         command writes it.
+
+        Args:
+            before: lines of its own to put before the analysis.
+            moved: what follows the stance there, such as ``.at(q)``.
         """
         lines, words = ["import copsense"], self.words
         if len(words) == 1:
@@ -145,7 +149,7 @@ class State:
             criteria = f"[{each}]"
         if not isinstance(self.limits, str):
             limits = "None" if self.limits is None else _limits_code(self.limits)
-        arguments = [stance, criteria, limits]
+        arguments = [f"{stance}{moved}", criteria, limits]
         if self.held and self.coordinates:
             arguments.append(f"at={self.at!r}")
         elif self.coordinates:
@@ -154,6 +158,7 @@ class State:
             if self.joints:
                 arguments.append(f"joints={self.joints!r}")
         inside = "".join(f"    {each},\n" for each in arguments)
+        lines += [before] * bool(before)
         return "\n".join([*lines, f"analysis = copsense.analyse(\n{inside})", "print(analysis)"])
 
     def to_dict(self) -> dict[str, Any]:
@@ -220,16 +225,6 @@ class State:
             ) from None
 
 
-_NAMES = {
-    "normal_force": "normal-force",
-    "friction": "friction",
-    "friction_sides": "sides",
-    "cop_margin": "cop-margin",
-    "torsion": "torsion",
-    "torque": "torque",
-}
-
-
 def limits_text(limits: Limits) -> str:
     """Limits as ``--limits`` has them.
 
@@ -237,7 +232,7 @@ def limits_text(limits: Limits) -> str:
         InvalidInputError: a limit that differs by contact or joint: only a file can say that.
     """
     usual, parts = Limits(), []
-    for name, word in _NAMES.items():
+    for word, name in LIMIT_NAMES.items():
         value = getattr(limits, name)
         if isinstance(value, Mapping):
             raise InvalidInputError(
