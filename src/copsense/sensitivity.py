@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -248,23 +247,23 @@ class CopSensitivity:
     def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
         stance = self.equilibrium.stance
         # s = w (b - a p) is linear in the wrench: one row gives the slack and its rate.
-        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1)).tolist()
-        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2)).tolist()
-        travel, edge = [np.inf] * len(self.cop), [-1] * len(self.cop)
-        # Plain numbers: a sole's few edges would take NumPy longer.
+        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1))
+        rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
+        for contact, rows in zip(stance.contacts, stance.edges, strict=True):
+            if contact.sole is not None and len(contact.sole) == 2:
+                # On the line, whatever side rounding puts it.
+                slack[rows][np.abs(slack[rows]) <= _ON_EDGE] = 0.0
+        # An edge that stands still and is passed already leaves no way back.
+        distance = np.where(slack < -_ON_EDGE, -np.inf, np.inf)
+        speed = np.hypot(rate[:, 0], rate[:, 1])
+        np.divide(slack, speed, out=distance, where=speed > _STILL)
+        travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
         for k, rows in enumerate(stance.edges):
-            line = (sole := stance.contacts[k].sole) is not None and len(sole) == 2
-            for i in range(rows.start, rows.stop):
-                if line and abs(slack[i]) <= _ON_EDGE:
-                    slack[i] = 0.0  # on the line, whatever side rounding puts it
-                speed = math.hypot(*rate[i])
-                if speed > _STILL:
-                    distance = slack[i] / speed
-                else:  # an edge that stands still and is passed already leaves no way back
-                    distance = -np.inf if slack[i] < -_ON_EDGE else np.inf
-                if distance < travel[k]:
-                    travel[k], edge[k] = distance, i - rows.start
-        return read_only(np.array(travel)), read_only(np.array(edge))
+            if rows.stop > rows.start:
+                nearest = int(distance[rows].argmin())
+                travel[k] = distance[rows][nearest]
+                edge[k] = nearest if travel[k] < np.inf else -1
+        return read_only(travel), read_only(edge)
 
 
 def cop_sensitivity(
