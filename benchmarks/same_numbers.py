@@ -62,6 +62,10 @@ COMMANDS = {
     "reproduce": "reproduce --output OUT/report --quiet",
 }
 
+# A closed loop amplifies rounding, by a thousand times and more.
+_CLOSED_LOOP, _CLOSED_LOOP_TOLERANCE = re.compile(r"closed_loop\w*\.nc/|claims.json/loop-"), 1e-2
+_PERIOD = "the report's closed loops have a control period of 4 ms, once 1 ms"
+
 # What changed on purpose since commit 24fd220: (command, path of the value) as regular expressions,
 # and the reason.
 EXPECTED: list[tuple[str, str, str]] = [
@@ -84,10 +88,14 @@ EXPECTED: list[tuple[str, str, str]] = [
     ("reproduce", r"errata.json/.*/(printed|holds|note)", "the right formula, and wording"),
     ("reproduce", "claims.json/(eq-29|flat-on-support|.*14.*|inverse-mass)/", "see the changelog"),
     ("reproduce", "setting.json/parameters/accuracy", "rounding"),
+    (
+        "analyse",
+        r"contacts/[^/]*/cop_(slope|per_\w+)/",
+        "the lateral path through a posture is the one nearest to it, however it was reached",
+    ),
+    ("reproduce", _CLOSED_LOOP.pattern, _PERIOD),
+    ("reproduce", r"benchmark.csv/#/(key|value|low|high|reason|parameters|runs)$", _PERIOD),
 ]
-
-# A closed loop amplifies rounding, by a thousand times and more.
-_CLOSED_LOOP, _CLOSED_LOOP_TOLERANCE = re.compile(r"closed_loop\w*\.nc/|claims.json/loop-"), 1e-2
 
 # Nothing about the mathematics: times, versions, paths.
 _IGNORED = re.compile(
@@ -126,8 +134,9 @@ def record(checkout: Path, folder: Path) -> None:
 
 def _typed(arguments: str, checkout: Path) -> str:
     """The arguments as a checkout reads them: once ``--xi`` was a bare number of radians."""
-    command = (checkout / "src/copsense/cli/four_bar_command.py").read_text("utf-8")
-    return arguments if "ANGLE" in command else re.sub(r"(--xi \S+?)rad", r"\1", arguments)
+    command = checkout / "src/copsense/cli/four_bar_command.py"
+    units = command.exists() and "ANGLE" in command.read_text("utf-8")
+    return arguments if units else re.sub(r"(--xi \S+?)rad", r"\1", arguments)
 
 
 def compare(old: Path, new: Path) -> int:
@@ -217,6 +226,8 @@ def _walk(value: Any, place: str) -> Iterator[tuple[str, Any]]:
             label: Any = i
             if isinstance(inner, dict) and "identifier" in inner:
                 label = inner["identifier"]
+            elif isinstance(inner, dict) and {"name", "mass"} <= set(inner):
+                label = inner["name"]  # of a robot: others have come among them
             elif isinstance(inner, dict) and {"where", "kind"} <= set(inner):
                 # A list of limits is in the order of their travels, which ties decide by rounding.
                 label = f"{inner['where']}: {inner['kind']}"
