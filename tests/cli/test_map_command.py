@@ -141,7 +141,9 @@ def test_the_command_says_that_it_compiles_first(tmp_path, monkeypatch):
     monkeypatch.setattr("copsense.batch.compiler.is_compiled", lambda _: False)
     answer = run("map", "icub", "--over", "com_y=0:0.01:2", "--output", tmp_path / "m.zarr")
     assert answer.code == 0
-    assert "note: the kernel is compiled first" in answer.err
+    for what in ("the search for postures", "the statics of many postures"):
+        assert f"note: compiling {what}, once on a machine" in answer.err
+        assert f"note: compiled {what} in 0 s" in answer.err  # from disk
 
 
 def test_without_numba_the_command_says_that_it_will_take_long(tmp_path, monkeypatch):

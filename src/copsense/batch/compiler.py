@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import logging
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,6 +20,8 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
+# Without a configuration of logging this goes to standard error: nobody waits in silence.
+_LOG = logging.getLogger(__name__)
 
 # Numba would look at a function's own file alone, and call an older version of a function from
 # another one: machine code is of use while the text of the kernels does not change.
@@ -36,12 +40,24 @@ def entry(function: _Function) -> _Function:
     return _jit(function)
 
 
-def bound(kernel: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+def bound(kernel: Any, arguments: tuple[Any, ...], what: str) -> Callable[..., Any]:
     """A kernel's machine code for arguments of these types, compiled or read from disk.
 
-    Arguments of other types than these must not be given to it.
+    Arguments of other types than these must not be given to it. Compiling takes seconds, and is
+    logged.
+
+    Args:
+        kernel: an `entry`.
+        arguments: as it will get them.
+        what: the kernel in words.
     """
+    new = not is_compiled(kernel)
+    if new:
+        _LOG.warning("compiling %s, once on a machine; it takes up to half a minute", what)
+    start = time.monotonic()
     found: Callable[..., Any] = kernel.compile(tuple(typeof(a) for a in arguments))
+    if new:
+        _LOG.warning("compiled %s in %.0f s", what, time.monotonic() - start)
     return found
 
 

@@ -11,7 +11,7 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.place_options import reject_varied
-from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar
+from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar, waiting
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -108,7 +108,7 @@ def map_command(
     a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
-    from copsense.batch import BatchKernel
+    from copsense.batch import BatchKernel, PostureChart
     from copsense.files import check_output
     from copsense.maps import MapPlan
     from copsense.maps.heights import height_advice
@@ -132,14 +132,15 @@ def map_command(
     pair = _pair(plot_over, sampling.names)
     plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations)
     echo_notes(note for note in plan.notes if note not in stance.robot.notes)
+    kernel = BatchKernel(stance, plan.criteria)
+    with waiting("compiling"):
+        PostureChart(stance, sampling.names).compile()
+        kernel.compile()
     if not Path(output).exists():
-        kernel = BatchKernel(stance, plan.criteria)
         if kernel.fallback_reason:
             _note(
                 f"postures are evaluated one at a time, milliseconds each: {kernel.fallback_reason}"
             )
-        elif not kernel.compiled:
-            _note("the kernel is compiled first, which takes about a minute, once on a machine")
         _note(height_advice(stance, sampling))
     done = 0
     with progress_bar(len(sampling), "map") as update:

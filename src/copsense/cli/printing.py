@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import logging
+import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +25,37 @@ def progress_bar(
 
     with tqdm(total=total, desc=what, unit=unit, disable=None, leave=False) as bar:
         yield bar.update
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """The time that something without a count takes, ticking where someone is there to see it.
+
+    What is logged meanwhile, such as what is compiled, is said as notes.
+    """
+    from tqdm import tqdm
+
+    class Notes(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            with bar.external_write_mode(sys.stderr):
+                click.echo(f"note: {record.getMessage()}", err=True)
+
+    over = threading.Event()
+
+    def tick() -> None:
+        while not over.wait(0.5):
+            bar.refresh()
+
+    with tqdm(bar_format=f"{what}: {{elapsed}}", disable=None, leave=False) as bar:
+        ticking, notes = threading.Thread(target=tick, daemon=True), Notes()
+        logging.getLogger("copsense").addHandler(notes)
+        ticking.start()
+        try:
+            yield
+        finally:
+            over.set()
+            ticking.join()
+            logging.getLogger("copsense").removeHandler(notes)
 
 
 PICTURES = (".png", ".svg", ".pdf")

@@ -200,14 +200,15 @@ class Explorer:
 
     def _compile(self) -> None:
         self._status = (
-            "charts are compiled, once on a machine (some 20 s); until then one posture at a time"
+            "the search for postures is compiled, once on a machine (up to half a minute); until "
+            "then one posture at a time"
         )
         self._worker.again()
         try:
             self.model.use_compiled()
             self._status = ""
         except CopsenseError as error:
-            self._status = f"charts are not compiled: {error}"
+            self._status = f"the search for postures is not compiled: {error}"
         self._worker.again()
 
     def _reset(self) -> None:

@@ -138,9 +138,8 @@ class Model:
         return State(self.words)
 
     def use_compiled(self) -> None:
-        """Compile what charts need, 20 s once on a machine, and use it from then on."""
-        chart = PostureChart(self.stance, ("com_y",))
-        chart.solve([chart.values])
+        """Compile what charts need, seconds once on a machine, and use it from then on."""
+        PostureChart(self.stance, ("com_y",)).compile()
         self.compiled = True
 
     def criteria_of(self, state: State) -> dict[str, Criterion]:

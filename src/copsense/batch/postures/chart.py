@@ -123,7 +123,7 @@ class PostureChart:
 
     @property
     def compiled(self) -> bool:
-        """Whether the kernel is compiled: if not, the first search takes some 20 s more.
+        """Whether the kernel is compiled: if not, the first search waits for it; see `compile`.
 
         True where postures are solved one at a time.
         """
@@ -133,6 +133,14 @@ class PostureChart:
         from copsense.batch.postures.newton import solve_postures
 
         return is_compiled(solve_postures)
+
+    def compile(self) -> None:
+        """Have the kernel compiled now: seconds, once on a machine, kept on disk.
+
+        It is logged as it begins and ends. Nothing is done where it is `compiled`.
+        """
+        if not self.compiled:
+            self.solve([self.values])
 
     def empty(self, count: int) -> PostureBatch:
         """Arrays for `count` postures, to be filled with ``out=``."""
@@ -212,7 +220,8 @@ class PostureChart:
         )
         arguments = (*self._given, x, found)
         if self._code is None:
-            self._code = bound(solve_postures, (*arguments, workspace(1), 0, 0))
+            given = (*arguments, workspace(1), 0, 0)
+            self._code = bound(solve_postures, given, "the search for postures")
         solve, blocks = partial(self._code, *arguments), -(-len(x) // _BLOCK)
 
         def run(share: int) -> None:

@@ -100,12 +100,19 @@ class BatchKernel:
 
     @property
     def compiled(self) -> bool:
-        """Whether the kernel is compiled: if not, the first evaluation takes half a minute more.
+        """Whether the kernel is compiled: if not, the first evaluation waits for it; see `compile`.
 
-        Machine code is kept on disk, so that this happens once on a machine. True where the
-        reference answers everything.
+        True where the reference answers everything.
         """
         return bool(self.fallback_reason) or self._kernel.compiled
+
+    def compile(self) -> None:
+        """Have the kernel compiled now: seconds, once on a machine, kept on disk.
+
+        It is logged as it begins and ends. Nothing is done where it is `compiled`.
+        """
+        if not self.compiled:
+            self._single = _Single(self)
 
     def empty(self, count: int) -> BatchResult:
         """Arrays for the results of `count` postures, to be filled with ``out=``."""

@@ -56,7 +56,8 @@ class CompiledKernel:
         }
         arguments = (*self._given, q, Out(**arrays, doubtful=doubtful))
         if self._code is None:
-            self._code = bound(evaluate_postures, (*arguments, self.workspace(), 0, 0))
+            given = (*arguments, self.workspace(), 0, 0)
+            self._code = bound(evaluate_postures, given, "the statics of many postures")
         return partial(self._code, *arguments)
 
 
