@@ -36,7 +36,10 @@ def waiting(what: str) -> Iterator[None]:
     from tqdm import tqdm
 
     class Notes(logging.Handler):
+        """What is logged, as notes."""
+
         def emit(self, record: logging.LogRecord) -> None:
+            """Say one."""
             with bar.external_write_mode(sys.stderr):
                 click.echo(f"note: {record.getMessage()}", err=True)
 
