@@ -20,6 +20,7 @@ TABLE = "Analysis"  # reads as the command's table, which is as long as its crit
 INTERNAL = (
     "copsense.batch",
     "copsense.comparison.plan_file",
+    "copsense.contact_layout",
     "copsense.logs.channel",
     "copsense.logs.log_motion",
     "copsense.logs.matlab_tree",

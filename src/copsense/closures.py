@@ -28,13 +28,14 @@ from copsense import rigid_body
 from copsense.arrays import array_property
 from copsense.content import ShortRepr, freeze
 from copsense.drives import Loop
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, OpenLoopError
 from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 
 # Singular values, relative, under which a row depends on others: the root of the tolerance on
 # postures, where Newton's search ends on a motion that exists to first order only.
 RANK = 1e-6
+OPEN = 1e-6  # m or rad: how far from closed a loop or coupling may be
 _ARM = 0.1  # distance between the two balls of a pin [m]
 _AXES = "xyz"
 
@@ -101,6 +102,21 @@ class Closures(ShortRepr):
             leader = self.robot.joint_position(self.q, coupling.of)
             found.append(np.array([follower - coupling.ratio * leader - coupling.offset]))
         return np.concatenate(found)
+
+    def check(self) -> None:
+        """Reject a configuration that leaves a loop or coupling open.
+
+        Raises:
+            OpenLoopError: it does, by more than `OPEN`.
+        """
+        error = np.abs(self.error)
+        worst = int(error.argmax())
+        if error[worst] > OPEN:
+            raise OpenLoopError(
+                f"{self.names[worst]} of robot {self.robot.name!r} is open by "
+                f"{error[worst]:.3g} (m or rad). copsense.load_stance and solve_posture close "
+                "loops and couplings; give a configuration in which they are closed."
+            )
 
     @array_property
     def jacobian(self) -> Float[np.ndarray, "l nv"]:

@@ -7,7 +7,7 @@ that changes with the posture depends on what the wrench is fixed to (theory2.md
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -109,6 +109,22 @@ class AppliedLoads(ShortRepr):
     points: Float[np.ndarray, "k 3"]
     forces: Mapping[int, pin.Force]
     derivative: Float[np.ndarray, "nv nv"]
+
+
+def known_loads(loads: Iterable[AnyLoad]) -> tuple[AnyLoad, ...]:
+    """Loads as a tuple, one alone among them.
+
+    Raises:
+        InvalidInputError: something else is among them.
+    """
+    alone = isinstance(loads, Load | SpringLoad | str) or not isinstance(loads, Iterable)
+    given: tuple[AnyLoad, ...] = (loads,) if alone else tuple(loads)  # type: ignore[assignment]
+    for load in given:
+        if not isinstance(load, Load | SpringLoad):
+            raise InvalidInputError(
+                f"{load!r} is not a load. Give copsense.Load(frame, force) or SpringLoad(...)."
+            )
+    return given
 
 
 def apply_loads(

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field
-from functools import cached_property, lru_cache
-from itertools import pairwise
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
-from scipy.linalg import block_diag, lapack
 
 from copsense import rigid_body
 from copsense.arrays import array_property, check_type, read_only
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.closures import Closures
-from copsense.contact import COMPONENT_NAMES, Contact, Plane
+from copsense.contact import Contact
+from copsense.contact_layout import ContactLayout, check_plane, lay_out
 from copsense.errors import (
-    ContactGeometryError,
     InsufficientContactsError,
     InvalidInputError,
-    OpenLoopError,
     UnknownNameError,
 )
+from copsense.free_motions import Folds, find_folds, least_energy, unit_energy
 from copsense.loads import (
     AnyLoad,
     AppliedLoads,
-    Load,
-    SpringLoad,
     apply_loads,
     doubt_loads,
+    known_loads,
     turning,
 )
 from copsense.motion import Motion
-from copsense.rigid_body import Attachment
 from copsense.robot import Robot
 from copsense.row_space import RowSpace
 from copsense.unheld import unheld_motions
@@ -46,21 +41,11 @@ from copsense.unheld import unheld_motions
 # posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
 # without ankle roll do, its singular value is then known to the root of that.
 RANK_TOLERANCE = 1e-6
-# Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
-_CURVED = 1e-4
 _ROUNDING = 1e-13  # of the largest column of J: what is smaller moves no contact and no loop
 # How fast, per unit of motion, contacts and loops come to hold what they leave free at a posture.
 _PASSING = 1e-3
 _INDIFFERENT = 1e-7  # m, of the weight: a motion whose balance changes less hangs nowhere
-_MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
-_HEAVY = 1e-4  # pivots of the energy, relative, from which every motion moves some mass
-_LOST = 1e-9  # singular values of the CoM Jacobian, relative, that count as unreachable
-_FOLDED = 1e-2  # the same where the contacts hold motions to second order only
-_APART = 1e-3  # from here on the CoM's two directions are far from depending on each other
-# How far a contact may lie from its stated plane.
-POSITION_TOLERANCE = 1e-6  # m
 AT_LIMIT = 1e-6  # rad or m: a joint this far beyond its limit is at it
-ANGLE_TOLERANCE = 1e-6  # rad
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -97,7 +82,7 @@ class Stance:
     check: InitVar[bool] = True
     loads: Sequence[AnyLoad] = ()
     motion: Motion | None = None
-    _layout: _Layout = field(init=False)
+    _layout: ContactLayout = field(init=False)
     # World placement of the contact frames as the foot carries them, and their local Jacobians.
     _feet: tuple[pin.SE3, ...] = field(init=False)
     _local: Float[np.ndarray, "nc 6 nv"] = field(init=False)
@@ -107,12 +92,12 @@ class Stance:
         check_type(self.robot, Robot, "a robot", "Give one, such as copsense.load_robot(...).")
         given: object = self.contacts
         contacts: Any = tuple(given) if isinstance(given, Iterable) else (given,)
-        layout = _layout(self.robot, contacts)
+        layout = lay_out(self.robot, contacts)
         q = self.robot.check_configuration(self.q)
         feet, local = rigid_body.place(self.robot, q, layout.attachments)
         for name, value in (
             ("contacts", contacts),
-            ("loads", _known_loads(self.loads)),
+            ("loads", known_loads(self.loads)),
             ("q", q),
             ("_layout", layout),
             ("_feet", feet),
@@ -122,10 +107,10 @@ class Stance:
         if check:
             self.robot.check_positions(q)
             for k, contact in enumerate(contacts):
-                _check_plane(contact, feet[k])
+                check_plane(contact, feet[k])
             check_support(self)
             if self.closures is not None:
-                _check_closed(self.closures)
+                self.closures.check()
 
     @classmethod
     def from_model(
@@ -172,7 +157,7 @@ class Stance:
 
     def with_loads(self, loads: Iterable[AnyLoad]) -> Stance:
         """The same robot, configuration and contacts under other loads."""
-        given = _known_loads(loads)
+        given = known_loads(loads)
         found = Stance(self.robot, self.q, self.contacts, loads=given, motion=self.motion)
         if found.applied is not None:
             doubt_loads(given, found.applied, self.robot)
@@ -425,7 +410,7 @@ class Stance:
         order, Q = d(J' y)/dq. Where Q is definite on some motions and zero on the others, as for
         the pelvis' roll on two legs without ankle roll, those cannot be followed at all.
         """
-        return self._folds[0]
+        return self._folds.motions
 
     @property
     def fold_equations(self) -> tuple[Float[np.ndarray, "k nv"], Float[np.ndarray, " k"]]:
@@ -434,7 +419,7 @@ class Stance:
         Contacts that hold a motion to second order are in place where e = 0, and Newton's method on
         them alone only halves its error.
         """
-        return self._folds[1:3]
+        return self._folds.equations, self._folds.errors
 
     @property
     def branching(self) -> bool:
@@ -443,29 +428,13 @@ class Stance:
         Q, see `false_motions`, then has both signs: J is deficient at this very posture, and on the
         way along most motions it is not, so that wrenches have no derivative.
         """
-        return self._folds[3]
+        return self._folds.branching
 
     @cached_property
-    def _folds(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
-        u, Z = self._motions.redundant, self._motions.null
-        if not u.shape[1]:
-            return read_only(Z[:, :0]), read_only(Z.T[:0]), read_only(np.zeros(0)), False
-        branching = False
-        motions, rows, errors = [np.zeros((len(Z), 0))], [np.zeros((0, len(Z)))], [np.zeros(0)]
-        for y in u.T:
-            turned = -self.curvature(y, np.zeros(3))  # d(J' y)/dq
-            values, vectors = np.linalg.eigh(Z.T @ (turned + turned.T) @ Z / 2)
-            curved = np.abs(values) > _CURVED
-            if curved.any() and (np.all(values[curved] > 0) or np.all(values[curved] < 0)):
-                false = Z @ vectors[:, curved]
-                motions.append(false)
-                rows.append(false.T @ turned)
-                errors.append(false.T @ self.constraints.T @ y)
-            elif curved.any():
-                branching = True
-        left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
-        found = left[:, s > _CURVED], np.vstack(rows), np.concatenate(errors)
-        return read_only(found[0]), read_only(found[1]), read_only(found[2]), branching
+    def _folds(self) -> Folds:
+        return find_folds(
+            self._motions, self.constraints, lambda y: -self.curvature(y, np.zeros(3))
+        )
 
     @array_property
     def energy_motions(self) -> Float[np.ndarray, "nv r"]:
@@ -474,16 +443,7 @@ class Stance:
         Motions of massless links alone are left out: they have no energy to be measured by, and
         move no centre of mass.
         """
-        Z = self.admissible_motions
-        energy = Z.T.dot(self.mass_matrix).dot(Z)
-        if len(energy):
-            factor, info = lapack.dpotrf(energy, lower=1)
-            pivots = factor.diagonal()
-            if info == 0 and pivots.min() > _HEAVY * pivots.max():
-                return np.asarray(lapack.dtrtrs(factor, Z.T, lower=1)[0].T)  # Z L^-T
-        values, vectors = np.linalg.eigh(energy)
-        kept = values > _MASSLESS * values.max(initial=0.0)
-        return np.asarray(Z @ (vectors[:, kept] / np.sqrt(values[kept])))
+        return unit_energy(self.admissible_motions, self.mass_matrix)
 
     @array_property
     def com_motions(self) -> Float[np.ndarray, "nv 2"]:
@@ -495,13 +455,7 @@ class Stance:
         """
         motions = self.energy_motions
         speeds = self.com_jacobian[:2].dot(motions)
-        (a, b), (_, c) = speeds.dot(speeds.T).tolist()
-        area = a * c - b * b
-        if area > _APART * (a + c) ** 2:
-            inverse = np.array([[c, -b], [-b, a]]) / area
-            return np.asarray(motions.dot(speeds.T).dot(inverse))
-        lost = _FOLDED if self.false_motions.shape[1] else _LOST
-        return np.asarray(motions @ np.linalg.pinv(speeds, rcond=lost))
+        return least_energy(motions, speeds, folded=bool(self.false_motions.shape[1]))
 
     @property
     def redundant_directions(self) -> tuple[str, ...]:
@@ -687,101 +641,6 @@ class Stance:
         return np.asarray(axes.T @ self._feet[k].rotation)
 
 
-@dataclass(frozen=True, eq=False)
-class _Layout:
-    """What a robot's contacts are at every configuration.
-
-    Attributes:
-        names: of the contacts.
-        attachments: joint and placement on it of each contact frame.
-        fixed_axes: world axes of a point contact; None for others, which turn with the foot.
-        rows: of each contact in stacked forces.
-        row_names: of stacked forces.
-        component_index: component 0..5 of each row (m,).
-        places: where each row stands among the contacts' wrenches, six numbers each (m,).
-        edge_rows: rows of the soles' edges over the contacts' wrenches, in shares of the weight.
-        edges: rows of each contact among them.
-    """
-
-    names: tuple[str, ...]
-    attachments: tuple[Attachment, ...]
-    fixed_axes: tuple[Float[np.ndarray, "3 3"] | None, ...]
-    rows: tuple[slice, ...]
-    row_names: tuple[str, ...]
-    component_index: Int[np.ndarray, " m"]
-    places: Int[np.ndarray, " m"]
-    edge_rows: Float[np.ndarray, "e k"]
-    edges: tuple[slice, ...]
-
-
-@lru_cache(maxsize=32)  # a path's stances share theirs
-def _layout(robot: Robot, contacts: tuple[Contact, ...]) -> _Layout:
-    """Validate contacts and look up where they are on the robot."""
-    for contact in contacts:
-        if not isinstance(contact, Contact):
-            raise InvalidInputError(f"{contact!r} is not a contact. Give Contact(frame=...).")
-    names = tuple(contact.name for contact in contacts)
-    if not names:
-        raise InvalidInputError(
-            "a stance needs at least one contact. Give Contact(frame=...) for each foot; "
-            f"frames of {robot.name!r}: {', '.join(robot.frame_names)}."
-        )
-    if len(set(names)) != len(names):
-        raise InvalidInputError(
-            f"two contacts share a name: {', '.join(names)}. Give each frame once, or name "
-            "the contacts apart with Contact(name=...)."
-        )
-    for contact in contacts:
-        if robot.frame(contact.frame).parentJoint == 0:
-            raise InvalidInputError(
-                f"frame {contact.frame!r} of contact {contact.name!r} is fixed in the world, not "
-                "part of the robot. Name a frame of a foot."
-            )
-    ends = np.cumsum([0] + [len(contact.components) for contact in contacts])
-    component = np.array([i for contact in contacts for i in contact.components])
-    owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
-    edges = block_diag(*(contact.edge_rows for contact in contacts)) / robot.weight
-    edge_ends = np.cumsum([0] + [len(contact.edge_rows) for contact in contacts])
-    return _Layout(
-        names,
-        tuple(contact.on(robot) for contact in contacts),
-        tuple((c.plane or Plane()).axes if c.kind == "point" else None for c in contacts),
-        _slices(ends),
-        tuple(f"{c.name} {COMPONENT_NAMES[i]}" for c in contacts for i in c.components),
-        read_only(component),
-        read_only(6 * owner + component),
-        read_only(edges),
-        _slices(edge_ends),
-    )
-
-
-def _slices(ends: np.ndarray) -> tuple[slice, ...]:
-    return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-
-
-def _check_plane(contact: Contact, foot: pin.SE3) -> None:
-    """Reject a contact frame that is not on its plane."""
-    if contact.plane is None:
-        return
-    # Written out: these few numbers would take NumPy longer than all of the kinematics.
-    (a, b, c), (px, py, pz) = contact.plane.normal, contact.plane.point
-    x, y, z = foot.translation.tolist()
-    u, v, w = foot.rotation[:, 2].tolist()
-    height = a * (x - px) + b * (y - py) + c * (z - pz)
-    along = a * u + b * v + c * w
-    tilt = math.hypot(v * c - w * b, w * a - u * c, u * b - v * a)
-    turned = contact.kind != "point" and (tilt > ANGLE_TOLERANCE or along < 0)
-    if abs(height) > POSITION_TOLERANCE or turned:
-        degrees = math.degrees(math.atan2(tilt, along))
-        raise ContactGeometryError(
-            f"contact {contact.name!r} is not on its plane: its origin is {height * 1e3:+.3f} "
-            f"mm off along the normal"
-            + ("" if contact.kind == "point" else f" and its z axis {degrees:.3f} deg away")
-            + ". Move the base or the joints (copsense.solve_posture places the feet), "
-            "correct the contact's offset or rotation, or drop its plane."
-        )
-
-
 def check_stance(stance: object) -> None:
     """Reject what is not a stance.
 
@@ -806,29 +665,6 @@ def check_at_rest(stance: Stance, what: str) -> None:
     if stance.motion is not None:
         raise InvalidInputError(
             f"{what} is of a robot at rest, and this stance moves. Give stance.at_rest()."
-        )
-
-
-def _known_loads(loads: Iterable[AnyLoad]) -> tuple[AnyLoad, ...]:
-    alone = isinstance(loads, Load | SpringLoad | str) or not isinstance(loads, Iterable)
-    given: tuple[AnyLoad, ...] = (loads,) if alone else tuple(loads)  # type: ignore[assignment]
-    for load in given:
-        if not isinstance(load, Load | SpringLoad):
-            raise InvalidInputError(
-                f"{load!r} is not a load. Give copsense.Load(frame, force) or SpringLoad(...)."
-            )
-    return given
-
-
-def _check_closed(closures: Closures) -> None:
-    """Reject a configuration that leaves a loop or coupling open."""
-    error = np.abs(closures.error)
-    worst = int(error.argmax())
-    if error[worst] > POSITION_TOLERANCE:
-        raise OpenLoopError(
-            f"{closures.names[worst]} of robot {closures.robot.name!r} is open by "
-            f"{error[worst]:.3g} (m or rad). copsense.load_stance and solve_posture close loops "
-            "and couplings; give a configuration in which they are closed."
         )
 
 
