@@ -165,7 +165,9 @@ class Pushes(ShortRepr):
         """A polar picture of the pushes, by direction."""
         from copsense.plots import plot_pushes
 
-        return plot_pushes(self)
+        figure = plot_pushes(self).get_figure(root=True)
+        assert figure is not None
+        return figure
 
     def __str__(self) -> str:
         """A table: along each axis, and the weakest direction."""

@@ -3,9 +3,9 @@
 Functions take results (a `Sweep`, a `Recording`, a `Design`, what `cop_sensitivity` gives) and
 return Axes, or a Figure where they draw several. They open no window and keep no global state.
 
-`ax`, or `axes` where a function draws several panels, are the caller's Axes to draw in: the rest of
-their figure stays as it is, and a legend there is added to. `label` and `color` tell sweeps apart
-that are drawn into the same Axes. Notebooks show the figures (of Axes, `ax.figure`).
+Every function takes `ax`, or `axes` where it draws several panels: the caller's Axes to draw in.
+The rest of their figure stays as it is, and a legend there is added to. `label` and `color` tell
+results apart that are drawn into the same Axes. Notebooks show what is returned.
 """
 
 from __future__ import annotations

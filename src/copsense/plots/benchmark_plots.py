@@ -12,7 +12,18 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from copsense.comparison import CAVEAT, agreement, shown_unit
-from copsense.plots.style import INK, MUTED, colours, new_figure, styled
+from copsense.plots.style import (
+    INK,
+    MUTED,
+    Color,
+    Panels,
+    given_axes,
+    looks,
+    new_figure,
+    put_legend,
+    styled,
+    whole_figure,
+)
 
 _ACROSS = 3  # panels in a row
 _BAR = 0.24  # inches that a bar takes
@@ -20,13 +31,24 @@ _SETTING = ["robot", "posture", "conditions"]
 
 
 @styled
-def plot_benchmark(table: pd.DataFrame) -> Figure:
+def plot_benchmark(
+    table: pd.DataFrame,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Figure:
     """Draw a benchmark's table: simulated against predicted above, the controllers' scores below.
 
     Args:
         table: what `copsense.comparison.run_benchmark` or `load_benchmark` returns.
+        axes: where to draw, one for each score that has a prediction, then one for each trial and
+            score; the legend then is over the first of them. Default a new figure.
+        label: what the legend says, before the controller's name where there are several.
+        color: of the only controller, or controller -> color; default as in every figure.
     """
-    colour = colours(dict.fromkeys(table["controller"]))
+    look = looks(list(dict.fromkeys(table["controller"])), color, label, what="controllers")
+    colour = look.colour
     found = agreement(table)
     compared = list(dict.fromkeys(found["score"]))
     groups = [
@@ -34,22 +56,20 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
         for key, rows in table.groupby(["trial", "score"], sort=False)
         if not (rows["status"] == "none").all()  # point feet have no margin
     ]
-    top = math.ceil(len(compared) / _ACROSS)
-    tall = [_height(rows, colour) for _, rows in groups]
-    pairs = [tall[i : i + _ACROSS] for i in range(0, len(tall), _ACROSS)]
-    heights = [3.3] * top + [max(pair) for pair in pairs]
-    figure = new_figure(11.0, sum(heights) + 0.9)
-    grid = figure.add_gridspec(len(heights), _ACROSS, height_ratios=heights)
-    for i, score in enumerate(compared):
-        ax = figure.add_subplot(grid[i // _ACROSS, i % _ACROSS])
+    names = [*(f"{score} predicted" for score in compared), *(f"{t}, {s}" for (t, s), _ in groups)]
+    if axes is None:
+        panels = _panels(len(compared), [_height(rows, colour) for _, rows in groups])
+    else:
+        panels = given_axes(axes, names)
+    for ax, score in zip(panels, compared, strict=False):
         _draw_agreement(ax, table, found, score, colour)
     for i, ((trial, score), rows) in enumerate(groups):
-        ax = figure.add_subplot(grid[top + i // _ACROSS, i % _ACROSS])
         row = range(i - i % _ACROSS, min(i - i % _ACROSS + _ACROSS, len(groups)))
-        settings = max(_settings(groups[j][1]) for j in row)
-        _draw_bars(ax, str(trial), str(score), rows, colour, settings)
+        beside = row if axes is None else (i,)
+        settings = max(_settings(groups[j][1]) for j in beside)
+        _draw_bars(panels[len(compared) + i], str(trial), str(score), rows, colour, settings)
     handles: list[Line2D | Patch] = [
-        Patch(color=shade, label=name) for name, shade in colour.items()
+        Patch(color=shade, label=name) for name, shade in look.legend.items()
     ]
     dot = {"color": MUTED, "linestyle": "", "marker": "o", "markersize": 5.5}
     if compared:
@@ -58,6 +78,10 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
             Line2D([], [], label="to first order", markerfacecolor="none", **dot),  # type: ignore[arg-type]
         ]
     handles.append(Line2D([], [], label="prediction", color=INK, linestyle="", marker="|"))
+    figure = whole_figure(panels[0])
+    if axes is not None:
+        put_legend(panels[0], handles)
+        return figure
     figure.legend(
         handles=handles,
         loc="outside lower center",
@@ -76,6 +100,17 @@ def plot_benchmark(table: pd.DataFrame) -> Figure:
     )
     figure.get_layout_engine().set(w_pad=0.07, h_pad=0.08)  # type: ignore[union-attr,call-arg]
     return figure
+
+
+def _panels(compared: int, tall: list[float]) -> list[Axes]:
+    """The panels of a figure of its own: scores above, below them bars of a height [inches]."""
+    top = math.ceil(compared / _ACROSS)
+    rows = [tall[i : i + _ACROSS] for i in range(0, len(tall), _ACROSS)]
+    heights = [3.3] * top + [max(row) for row in rows]
+    figure = new_figure(11.0, sum(heights) + 0.9)
+    grid = figure.add_gridspec(len(heights), _ACROSS, height_ratios=heights)
+    places = [*range(compared), *(top * _ACROSS + i for i in range(len(tall)))]
+    return [figure.add_subplot(grid[i // _ACROSS, i % _ACROSS]) for i in places]
 
 
 def _height(rows: pd.DataFrame, colour: dict[str, str]) -> float:

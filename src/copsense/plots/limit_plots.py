@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import cycle, pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,7 @@ from copsense.plots.style import (
     INK,
     LIMIT_LINE,
     MUTED,
+    Color,
     Panels,
     add_legend,
     axes_or_new,
@@ -27,6 +28,7 @@ from copsense.plots.style import (
     colours,
     given_axes,
     line_styles,
+    looks,
     new_figure,
     styled,
     whole_figure,
@@ -45,6 +47,8 @@ def plot_limited(
     binding: Mapping[str, Sequence[float]],
     *,
     axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
 ) -> Figure:
     """Draw a sweep within limits: each CoP, and its slope with the jumps where a limit binds.
 
@@ -52,11 +56,14 @@ def plot_limited(
         sweep: a lateral sweep evaluated with limits.
         binding: criterion -> CoM y at which its first limit binds, to either side [m].
         axes: where to draw the CoPs and their slopes; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     left, right = axes_or_pair(axes, ("the CoPs", "their slopes"), 9.2, 3.9)
-    plot_cop(sweep, ax=left, legend=False)
     x, names = abscissa(sweep), labels(sweep, "criterion")
-    contacts, colour = labels(sweep, "contact"), colours(names)
+    look, contacts = looks(names, color, label), labels(sweep, "contact")
+    colour = look.colour
+    plot_cop(sweep, ax=left, color=colour, legend=False)
     styles = line_styles(contacts)
     slope = sweep["cop_slope"].sel(axis="y").values
     for j, name in enumerate(names):
@@ -74,7 +81,7 @@ def plot_limited(
                 )
     right.set_xlabel(x.label)
     right.set_ylabel("slope of CoP y along the path [m/m]")
-    add_legend(right, colour, styles)
+    add_legend(right, look.legend, styles)
     return whole_figure(left)
 
 
@@ -85,6 +92,8 @@ def plot_regions(
     *,
     com: ArrayLike | None = None,
     ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
 ) -> Axes:
     """Draw nested regions of the CoM from above, the widest first, with the soles and its path.
 
@@ -93,16 +102,20 @@ def plot_regions(
         sweep: gives the soles and the path of the CoM.
         com: (2,) world x, y of the CoM at the posture that the regions hold [m].
         ax: where to draw; default a new figure.
+        label: what the legend says, before the region's name where there are several.
+        color: of the only region, or region -> color; default a criterion's own, grey for others.
     """
     ax = axes_or_new(ax, 6.2, 4.6)
-    colour = colours([name for name in regions if name in labels(sweep, "criterion")])
+    own = colours([name for name in regions if name in labels(sweep, "criterion")])
+    grey = cycle(("#9aa4ae", INK, MUTED))
+    usual = {name: own.get(name) or next(grey) for name in regions}
+    look = looks(list(regions), color, label, what="regions", usual=usual)
     draw_ground(ax, world_soles(sweep), contact_origins(sweep))
-    grey = iter(("#9aa4ae", INK, MUTED))
     shown: dict[str, str] = {}
     corners = [np.zeros((0, 2))]
     for number, (name, region) in enumerate(regions.items()):
-        shade = colour.get(name) or next(grey)
-        shown[name if region.bounded else f"{name} (without end)"] = shade
+        shade, words = look.colour[name], look.words[name]
+        shown[words if region.bounded else f"{words} (without end)"] = shade
         outline = region.polygon * MM
         corners.append(outline)
         if len(outline) >= _DEGENERATE:
@@ -130,12 +143,21 @@ def plot_regions(
 
 
 @styled
-def plot_limit_margins(sweep: Sweep, *, axes: Panels | None = None, legend: bool = True) -> Figure:
+def plot_limit_margins(
+    sweep: Sweep,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+    legend: bool = True,
+) -> Figure:
     """Draw the smallest margin to each kind of limit along a sweep, and where the first binds.
 
     Args:
         sweep: a sweep within limits, or from `Sweep.with_limit_margins`.
         axes: where to draw, one for each of `limit_kinds`; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
         legend: whether to add a legend of the criteria.
     """
     kinds = limit_kinds(sweep)
@@ -143,7 +165,8 @@ def plot_limit_margins(sweep: Sweep, *, axes: Panels | None = None, legend: bool
         axes = new_figure(max(2.9 * len(kinds), 4.2), 3.0).subplots(1, len(kinds), squeeze=False)[0]
     axes = given_axes(axes, kinds)
     x, names = abscissa(sweep), labels(sweep, "criterion")
-    colour = colours(names)
+    look = looks(names, color, label)
+    colour = look.colour
     for ax, kind in zip(axes, kinds, strict=True):
         of_kind = sweep["limit_kind"].values == kind
         unit = str(sweep["limit_unit"].values[of_kind][0])
@@ -152,14 +175,15 @@ def plot_limit_margins(sweep: Sweep, *, axes: Panels | None = None, legend: bool
         least = np.where(np.isnan(margin), np.inf, margin).min(axis=-1)
         least = np.where(np.isfinite(least), least, np.nan)
         for j, name in enumerate(names):
-            ax.plot(x.values, least[:, j], color=colour[name], **marks(sweep))
+            line = least[:, j]
+            ax.plot(x.values, line, color=colour[name], label=look.words[name], **marks(sweep))
         shade_below_zero(ax, least, "beyond")
-        mark_first_limits(ax, sweep)
+        mark_first_limits(ax, sweep, colour)
         ax.set_title(_KIND_TITLES.get(kind, kind))
         ax.set_xlabel(x.label)
         ax.set_ylabel(f"smallest margin [{unit}]")
     if legend:
-        add_legend(axes[0], colour)
+        add_legend(axes[0], look.legend)
     return whole_figure(axes[0])
 
 
@@ -168,15 +192,14 @@ def limit_kinds(sweep: Sweep) -> list[str]:
     return list(dict.fromkeys(str(kind) for kind in sweep["limit_kind"].values))
 
 
-def mark_first_limits(ax: Axes, sweep: Sweep) -> None:
+def mark_first_limits(ax: Axes, sweep: Sweep, colour: Mapping[str, str]) -> None:
     """A dotted line where each criterion meets its first limit, to either side of free postures."""
-    x, names = abscissa(sweep).values, labels(sweep, "criterion")
-    colour = colours(names)
-    for j, name in enumerate(names):
+    x = abscissa(sweep).values
+    for j, shade in enumerate(colour.values()):
         for at in first_limits(sweep, j):
             ax.axvline(
                 float(np.interp(at, np.arange(len(x)), x)),
-                color=colour[name],
+                color=shade,
                 zorder=1,
                 **LIMIT_LINE,
             )

@@ -17,12 +17,17 @@ from copsense.plots.reading import DEG, MM
 from copsense.plots.style import (
     INK,
     MUTED,
+    Color,
+    Looks,
+    Panels,
     axes_or_new,
-    colours,
+    given_axes,
     line_styles,
+    looks,
     new_figure,
     put_legend,
     styled,
+    whole_figure,
 )
 
 if TYPE_CHECKING:
@@ -36,18 +41,34 @@ _MOST = 4  # joints whose torques are drawn
 
 
 @styled
-def plot_log(comparison: LogComparison) -> Figure:
+def plot_log(
+    comparison: LogComparison,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Figure:
     """Draw a comparison: load over time and over the CoM, CoPs and torques over time.
 
     In the second panel the beginning that the slopes leave out is grey.
+
+    Args:
+        comparison: what `copsense.logs.compare_log` returned.
+        axes: where to draw these four; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
-    figure = new_figure(12.0, 7.4)
-    panels = figure.subplots(2, 2)
-    plot_log_load(comparison, ax=panels[0, 0], legend=False)
-    plot_log_slope(comparison, ax=panels[0, 1])
-    plot_log_cop(comparison, ax=panels[1, 0], legend=False)
-    plot_log_torques(comparison, ax=panels[1, 1])
-    handles = _handles(comparison)
+    look, given = _looks(comparison, color, label), axes is not None
+    panels = list(new_figure(12.0, 7.4).subplots(2, 2).flat) if axes is None else axes
+    load, slope, cop, torques = given_axes(panels, ("load", "slope", "CoPs", "torques"))
+    figure = whole_figure(load)
+    plot_log_load(comparison, ax=load, label=label, color=look.colour, legend=given)
+    plot_log_slope(comparison, ax=slope, label=label, color=look.colour)
+    plot_log_cop(comparison, ax=cop, label=label, color=look.colour, legend=given)
+    plot_log_torques(comparison, ax=torques, label=label, color=look.colour)
+    if given:
+        return figure
+    handles = _handles(comparison, look)
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     figure.suptitle(comparison.heading, x=0.01, ha="left", fontsize=12.5, fontweight="bold")
     return figure
@@ -55,41 +76,56 @@ def plot_log(comparison: LogComparison) -> Figure:
 
 @styled
 def plot_log_load(
-    comparison: LogComparison, *, ax: Axes | None = None, legend: bool = True
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+    legend: bool = True,
 ) -> Axes:
     """Draw the share of the load on each contact over time, after Fig. 6; of criteria in motion.
 
     Args:
         comparison: what `copsense.logs.compare_log` returned.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
         legend: whether to explain the lines.
     """
     ax = axes_or_new(ax)
-    colour, names = _colour(comparison), comparison.contact_names
+    look, names = _looks(comparison, color, label), comparison.contact_names
     styles = line_styles(names)
     for k, name in enumerate(names):
         for each in _in_motion(comparison):
-            look = _look(each, colour) | {"linestyle": styles[name]}
-            ax.plot(comparison.times, each.shares[:, k], **look)
+            line = _line(each, look) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.shares[:, k], **line)
         ax.plot(
             comparison.times, comparison.shares[:, k], **(_MEASURED | {"linestyle": styles[name]})
         )
     ax.set_xlabel("time [s]")
     ax.set_ylabel("load share, in motion")
-    _explain(ax, comparison, legend)
+    _explain(ax, comparison, look, legend)
     return ax
 
 
 @styled
-def plot_log_slope(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+def plot_log_slope(
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Axes:
     """Draw the load share of the first contact over the CoM, with the line of every criterion.
 
     Args:
         comparison: what `copsense.logs.compare_log` returned.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     ax = axes_or_new(ax)
-    colour = _colour(comparison)
+    look = _looks(comparison, color, label)
     travel = comparison.travel * MM
     late = comparison.times >= comparison.skipped
     share = comparison.shares[:, 0]
@@ -102,7 +138,9 @@ def plot_log_slope(comparison: LogComparison, *, ax: Axes | None = None) -> Axes
         slope = load.get(each.name)
         if slope is not None and comparison.distance is not None:
             line = slope.middle + slope.value / (comparison.distance * MM) * (ends - middle)
-            ax.plot(ends, line, label=f"{each.name}: {slope.value:.3f}", **_look(each, colour))
+            ax.plot(
+                ends, line, label=f"{_words(each, look)}: {slope.value:.3f}", **_line(each, look)
+            )
     if "measured" in load:
         found = load["measured"]
         text = f"measured: {found.value:.3f} [{found.low:.3f}, {found.high:.3f}]"
@@ -115,7 +153,14 @@ def plot_log_slope(comparison: LogComparison, *, ax: Axes | None = None) -> Axes
 
 
 @styled
-def plot_log_cop(comparison: LogComparison, *, ax: Axes | None = None, legend: bool = True) -> Axes:
+def plot_log_cop(
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+    legend: bool = True,
+) -> Axes:
     """Draw the CoP of each contact in its own frame over time, after Figs. 7 and 8.
 
     Of both axes the one along which the CoPs move most; of criteria in motion.
@@ -123,26 +168,34 @@ def plot_log_cop(comparison: LogComparison, *, ax: Axes | None = None, legend: b
     Args:
         comparison: what `copsense.logs.compare_log` returned.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
         legend: whether to explain the lines' colours.
     """
     ax = axes_or_new(ax)
-    colour, axis = _colour(comparison), _cop_axis(comparison)
+    look, axis = _looks(comparison, color, label), _cop_axis(comparison)
     styles = line_styles(comparison.contact_names)
     for k, name in enumerate(comparison.contact_names):
         for each in _in_motion(comparison):
-            look = _look(each, colour) | {"linestyle": styles[name]}
-            ax.plot(comparison.times, each.cops[:, k, axis] * MM, **look)
+            line = _line(each, look) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.cops[:, k, axis] * MM, **line)
         cops = comparison.cops[:, k, axis]
         if np.isfinite(cops).any():
             ax.plot(comparison.times, cops * MM, **(_MEASURED | {"linestyle": styles[name]}))
     ax.set_xlabel("time [s]")
     ax.set_ylabel(f"CoP {'xy'[axis]} in the foot, in motion [mm]")
-    _explain(ax, comparison, legend, bool(np.isfinite(comparison.cops).any()))
+    _explain(ax, comparison, look, legend, bool(np.isfinite(comparison.cops).any()))
     return ax
 
 
 @styled
-def plot_log_joint(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+def plot_log_joint(
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Axes:
     """Draw the first contact's CoP over the joint that moves most, after Fig. 9b.
 
     What was measured is drawn where moments were; criteria in motion, and dotted at rest.
@@ -150,9 +203,12 @@ def plot_log_joint(comparison: LogComparison, *, ax: Axes | None = None) -> Axes
     Args:
         comparison: what `copsense.logs.compare_log` returned.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     ax = axes_or_new(ax)
-    log, colour, axis = comparison.log, _colour(comparison), _cop_axis(comparison)
+    log, axis = comparison.log, _cop_axis(comparison)
+    look = _looks(comparison, color, label)
     name = moving_joint(comparison)
     known = np.isfinite(log.positions[:, log.joint_names.index(name)])
     angle = np.interp(
@@ -163,13 +219,13 @@ def plot_log_joint(comparison: LogComparison, *, ax: Axes | None = None) -> Axes
     for each in comparison.statics:
         size = 2.0 if each.inertia else 1.0
         cop = each.cops[:, 0, axis] * MM
-        ax.plot(angle, cop, ".", color=colour[each.criterion], markersize=size)
+        ax.plot(angle, cop, ".", color=look.colour[each.criterion], markersize=size)
     cops = comparison.cops[:, 0, axis] * MM
     if np.isfinite(cops).any():
         ax.plot(angle, cops, ".", color=INK, markersize=2.0)
     ax.set_xlabel(f"{name} [deg]")
     ax.set_ylabel(f"CoP {'xy'[axis]} in {comparison.contact_names[0]} [mm]")
-    lines = [Line2D([], [], color=c, label=n) for n, c in colour.items()]
+    lines = [Line2D([], [], color=c, label=n) for n, c in look.legend.items()]
     if np.isfinite(cops).any():
         lines.append(Line2D([], [], label="measured", **_MEASURED))
     put_legend(ax, lines)
@@ -177,55 +233,73 @@ def plot_log_joint(comparison: LogComparison, *, ax: Axes | None = None) -> Axes
 
 
 @styled
-def plot_log_torques(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+def plot_log_torques(
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Axes:
     """Draw the joints whose torques the criteria see move most, over time.
 
     Args:
         comparison: what `copsense.logs.compare_log` returned.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     ax = axes_or_new(ax)
     ax.set_xlabel("time [s]")
     ax.set_ylabel("torque, in motion [Nm]")
     if not comparison.statics:
         return ax
-    colour = _colour(comparison)
+    look = _looks(comparison, color, label)
     spans = np.max([np.ptp(s.torques, axis=0) for s in comparison.statics], axis=0)
     joints = np.argsort(-spans)[: min(_MOST, len(spans))]
     styles = line_styles([comparison.torque_names[j] for j in joints])
     for j in joints:
         name = comparison.torque_names[j]
         for each in _in_motion(comparison):
-            look = _look(each, colour) | {"linestyle": styles[name]}
-            ax.plot(comparison.times, each.torques[:, j], **look)
+            line = _line(each, look) | {"linestyle": styles[name]}
+            ax.plot(comparison.times, each.torques[:, j], **line)
         if comparison.torques is not None and not math.isnan(float(comparison.torques[0, j])):
-            look = _MEASURED | {"linestyle": styles[name]}
-            ax.plot(comparison.times, comparison.torques[:, j], **look)
-    put_legend(
-        ax, [Line2D([], [], color=MUTED, linestyle=s, label=name) for name, s in styles.items()]
-    )
+            line = _MEASURED | {"linestyle": styles[name]}
+            ax.plot(comparison.times, comparison.torques[:, j], **line)
+    lines = [Line2D([], [], color=MUTED, linestyle=s, label=name) for name, s in styles.items()]
+    named = look.legend.items() if label else ()
+    put_legend(ax, [*(Line2D([], [], color=c, label=words) for words, c in named), *lines])
     return ax
 
 
 @styled
-def plot_log_intervals(comparison: LogComparison, *, ax: Axes | None = None) -> Axes:
+def plot_log_intervals(
+    comparison: LogComparison,
+    *,
+    ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Axes:
     """Draw the load's slope with its 95 % interval: a band measured, a point each criterion.
 
     Args:
         comparison: what `copsense.logs.compare_log` returned, with slopes of the load.
         ax: where to draw; default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
-    load, colour = comparison.slopes["load"], _colour(comparison)
+    load, look = comparison.slopes["load"], _looks(comparison, color, label)
     ax = axes_or_new(ax, height=0.9 + 0.42 * len(load))
     measured = load["measured"]
     ax.axvspan(measured.low, measured.high, color=INK, alpha=0.12, linewidth=0)
     ax.axvline(measured.value, color=INK, linewidth=1.0)
     for row, each in enumerate(comparison.statics):
         slope = load[each.name]
-        ax.plot([slope.low, slope.high], [row, row], color=colour[each.criterion], linewidth=2.0)
-        face = colour[each.criterion] if each.inertia else "white"
-        ax.plot(slope.value, row, "o", color=colour[each.criterion], markerfacecolor=face)
-    ax.set_yticks(range(len(comparison.statics)), [s.name for s in comparison.statics])
+        ax.plot(
+            [slope.low, slope.high], [row, row], color=look.colour[each.criterion], linewidth=2.0
+        )
+        face = look.colour[each.criterion] if each.inertia else "white"
+        ax.plot(slope.value, row, "o", color=look.colour[each.criterion], markerfacecolor=face)
+    ax.set_yticks(range(len(comparison.statics)), [_words(s, look) for s in comparison.statics])
     ax.set_ylim(len(comparison.statics) - 0.5, -0.5)
     ax.set_xlim(left=min(0.0, *(s.low for s in load.values())))
     ax.set_xlabel("slope of the load [1]")
@@ -239,16 +313,21 @@ def moving_joint(comparison: LogComparison) -> str:
     return comparison.log.joint_names[int(np.nanargmax(span))]
 
 
-def _colour(comparison: LogComparison) -> dict[str, str]:
-    return colours(dict.fromkeys(s.criterion for s in comparison.statics))
+def _looks(comparison: LogComparison, color: Color, label: str | None) -> Looks:
+    return looks(list(dict.fromkeys(s.criterion for s in comparison.statics)), color, label)
+
+
+def _words(statics: LogStatics, look: Looks) -> str:
+    """What a legend calls a criterion at rest, or in motion."""
+    return statics.name.replace(statics.criterion, look.words[statics.criterion], 1)
 
 
 def _in_motion(comparison: LogComparison) -> list[LogStatics]:
     return [s for s in comparison.statics if s.inertia]
 
 
-def _look(statics: LogStatics, colour: dict[str, str]) -> dict[str, Any]:
-    found = {"color": colour[statics.criterion], "linewidth": 1.3}
+def _line(statics: LogStatics, look: Looks) -> dict[str, Any]:
+    found = {"color": look.colour[statics.criterion], "linewidth": 1.3}
     return found if statics.inertia else found | _REST
 
 
@@ -258,21 +337,24 @@ def _cop_axis(comparison: LogComparison) -> int:
     return int(np.argmax(np.max(spans, axis=0))) if spans else 1
 
 
-def _handles(comparison: LogComparison) -> list[Line2D]:
-    colour = _colour(comparison)
-    lines = [Line2D([], [], label="measured", **_MEASURED)]
-    return lines + [Line2D([], [], label=s.name, **_look(s, colour)) for s in comparison.statics]
+def _handles(comparison: LogComparison, look: Looks) -> list[Line2D]:
+    return [
+        Line2D([], [], label="measured", **_MEASURED),
+        *(Line2D([], [], label=_words(s, look), **_line(s, look)) for s in comparison.statics),
+    ]
 
 
-def _explain(ax: Axes, comparison: LogComparison, whole: bool, measured: bool = True) -> None:
+def _explain(
+    ax: Axes, comparison: LogComparison, look: Looks, whole: bool, measured: bool = True
+) -> None:
     """A legend of the contacts' line styles, and of the colours where it is to be whole."""
     styles = line_styles(comparison.contact_names)
     lines = [Line2D([], [], color=MUTED, linestyle=s, label=name) for name, s in styles.items()]
     if not (measured or whole):
         lines.append(Line2D([], [], color="none", label="(no moments measured)"))
     if whole:
-        colours_of = _colour(comparison).items()
-        lines = [Line2D([], [], color=c, label=name) for name, c in colours_of] + lines
+        named = look.legend.items()
+        lines = [Line2D([], [], color=c, label=words) for words, c in named] + lines
         if measured:
             lines.insert(0, Line2D([], [], label="measured", **_MEASURED))
     put_legend(ax, lines)

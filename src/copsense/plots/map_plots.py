@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Float
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -16,7 +17,17 @@ from copsense.errors import InvalidInputError
 from copsense.maps.marginals import Marginal
 from copsense.plots.reading import MM
 from copsense.plots.robot_plots import draw_bones
-from copsense.plots.style import BAD, COM_LINE, INK, MUTED, new_figure, styled
+from copsense.plots.style import (
+    BAD,
+    COM_LINE,
+    INK,
+    MUTED,
+    Panels,
+    given_axes,
+    new_figure,
+    styled,
+    whole_figure,
+)
 
 # quantity -> (words, unit shown, factor)
 _SHOWN = {
@@ -25,6 +36,7 @@ _SHOWN = {
 }
 _NONE = "no posture was evaluated"
 _UNLIMITED = "without end: no contact can tip"
+_COLOURS, _CHANGE = "viridis", "RdBu"
 _LEVELS = 7  # contour lines
 _SHADES = (1.0, 0.55, 0.3)  # of the worst posture, the next and the one after
 
@@ -33,6 +45,10 @@ _SHADES = (1.0, 0.55, 0.3)  # of the worst posture, the next and the one after
 def plot_map(
     marginals: Sequence[Marginal],
     worst: Mapping[str, Sequence[Float[np.ndarray, "s 2 3"]]] | None = None,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: str | None = None,
 ) -> Figure:
     """Draw quantities of a map over two coordinates: heat maps with contour lines.
 
@@ -44,31 +60,49 @@ def plot_map(
         marginals: what `copsense.maps.marginal` gives, of the same map and criteria.
         worst: criterion -> skeletons of its worst postures, the worst first, as
             `copsense.skeleton.skeleton` gives them; three are drawn.
+        axes: where to draw, row by row; the bars of the values take some of their room. Default a
+            new figure.
+        label: what the titles say before the criterion's name.
+        color: Matplotlib's name of the values' color map; default ``"viridis"``.
 
     Raises:
-        InvalidInputError: there is no marginal, or they have different criteria.
+        InvalidInputError: there is no marginal, they have different criteria, `axes` are too few or
+            too many, or `color` is no color map.
     """
     if not marginals or len({m.criteria for m in marginals}) != 1:
         raise InvalidInputError(
             "plot_map needs marginals of one map: [marginal(load_map(path), quantity=...), ...]."
         )
+    if color is not None and color not in colormaps:
+        raise InvalidInputError(
+            f"{color!r} is not a color map of Matplotlib: give a name such as 'magma'."
+        )
     criteria = marginals[0].criteria
     columns = len(criteria) + (len(criteria) > 1)
     rows = len(marginals) + bool(worst)
-    figure = new_figure(3.7 * columns + 0.6, 3.1 * rows)
-    grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, here in zip(grid, marginals, strict=False):
-        _draw_row(figure, axes, here)
+    if axes is None:
+        figure: Figure = new_figure(3.7 * columns + 0.6, 3.1 * rows)
+        grid = figure.subplots(rows, columns, squeeze=False)
+    else:
+        across = [*criteria, *["their difference"] * (columns > len(criteria))]
+        down = [*(here.quantity for here in marginals), *["the worst postures"] * bool(worst)]
+        panels = given_axes(axes, [f"{row} of {column}" for row in down for column in across])
+        figure, grid = whole_figure(panels[0]), np.array(panels).reshape(rows, columns)
+    words = {name: name if label is None else f"{label}, {name}" for name in criteria}
+    for row, here in zip(grid, marginals, strict=False):
+        _draw_row(figure, row, here, words, color or _COLOURS)
     for ax, name in zip(grid[-1] if worst else (), criteria, strict=False):
-        _draw_postures(ax, name, list((worst or {}).get(name, ())))
+        _draw_postures(ax, words[name], list((worst or {}).get(name, ())))
     if worst and columns > len(criteria):
         grid[-1, -1].set_axis_off()
-    if any(np.isnan(here.values).any() for here in marginals):
+    if axes is None and any(np.isnan(here.values).any() for here in marginals):
         figure.supxlabel(f"Pale: {_NONE} there.", fontsize=9, color=MUTED)
     return figure
 
 
-def _draw_row(figure: Figure, axes: np.ndarray, here: Marginal) -> None:
+def _draw_row(
+    figure: Figure, axes: np.ndarray, here: Marginal, names: Mapping[str, str], colours: str
+) -> None:
     words, unit, factor = _SHOWN[here.quantity]
     values = here.values * factor
     shown = np.where(np.isfinite(values), values, np.nan)
@@ -77,15 +111,15 @@ def _draw_row(figure: Figure, axes: np.ndarray, here: Marginal) -> None:
         for ax in axes:
             _say(ax, _UNLIMITED)
     for ax, name, cells in zip(axes, here.criteria, shown, strict=False):
-        mesh = _heat(ax, here, cells, cmap="viridis", vmin=low, vmax=high)
-        ax.set_title(f"{name}\n{here.how} {words}", fontsize=9)
+        mesh = _heat(ax, here, cells, cmap=colours, vmin=low, vmax=high)
+        ax.set_title(f"{names[name]}\n{here.how} {words}", fontsize=9)
     bar = figure.colorbar(mesh, ax=list(axes[: len(shown)]), aspect=30)
     bar.set_label(f"{words} [{unit}]")
     if len(shown) > 1:
         ax, change = axes[-1], shown[1] - shown[0]
         reach = max(abs(v) for v in _range(change)) or 1.0
-        mesh = _heat(ax, here, change, cmap="RdBu", vmin=-reach, vmax=reach)
-        ax.set_title(f"{here.criteria[1]}\nless {here.criteria[0]}", fontsize=9)
+        mesh = _heat(ax, here, change, cmap=_CHANGE, vmin=-reach, vmax=reach)
+        ax.set_title(f"{names[here.criteria[1]]}\nless {here.criteria[0]}", fontsize=9)
         figure.colorbar(mesh, ax=ax, aspect=30).set_label(f"difference [{unit}]")
 
 
@@ -109,7 +143,7 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
         level for level in levels if known.min(initial=np.inf) < level < known.max(initial=-np.inf)
     ]
     if min(cells.shape) > 1 and crossed:
-        ink, halo = ("white", INK) if colour["cmap"] == "viridis" else (INK, "white")
+        ink, halo = (INK, "white") if colour["cmap"] == _CHANGE else ("white", INK)
         lines = ax.contour(
             *middles, np.ma.masked_invalid(cells.T), levels=crossed, colors=ink, linewidths=0.7
         )

@@ -18,14 +18,21 @@ from copsense.plots.style import (
     EDGE_LINE,
     MUTED,
     SOLE,
+    Color,
+    Looks,
+    Panels,
+    given_axes,
     line_styles,
+    looks,
     new_figure,
     put_legend,
     styled,
+    whole_figure,
 )
 from copsense.polygon import Polygon, unpadded
 from copsense.simulation import Event, Recording
 
+_SIX = ("forces", "CoPs", "the CoPs from above", "the CoM", "torques", "CoPs over a joint")
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 _RED = "#b3261e"
@@ -34,27 +41,43 @@ _MOST_NAMED = 6  # joints whose torque has a line of its own in the legend
 
 
 @styled
-def plot_rollout(recording: Recording, *, against: str | None = None) -> Figure:
+def plot_rollout(
+    recording: Recording,
+    *,
+    against: str | None = None,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Figure:
     """Draw a recording: forces, CoPs in the soles, CoM, torques, and CoP against a joint.
 
     Args:
         recording: with or without a static prediction attached.
         against: joint along the horizontal axis of the last panel; default the first hip roll,
             or the CoM without one.
+        axes: where to draw the six, row by row; default a new figure.
+        label: what the legends say, before the contact's name where there are several.
+        color: of the only contact, or contact -> color; default as in every figure.
     """
-    figure = new_figure(12.6, 7.4)
-    panels = figure.subplots(2, 3)
-    colour = _colours(labels(recording, "contact"))
-    _draw_forces(panels[0, 0], recording, colour)
-    _draw_cop(panels[0, 1], recording, colour)
-    _draw_above(panels[0, 2], recording, colour)
+    if axes is None:
+        panels = new_figure(12.6, 7.4).subplots(2, 3)
+    else:
+        panels = np.array(given_axes(axes, _SIX)).reshape(2, 3)
+    figure = whole_figure(panels[0, 0])
+    contacts = labels(recording, "contact")
+    look = looks(contacts, color, label, what="contacts", usual=_colours(contacts))
+    _draw_forces(panels[0, 0], recording, look)
+    _draw_cop(panels[0, 1], recording, look)
+    _draw_above(panels[0, 2], recording, look)
     _draw_com(panels[1, 0], recording)
     _draw_torques(panels[1, 1], recording)
-    _draw_against(panels[1, 2], recording, colour, against or _hip_roll(recording))
+    _draw_against(panels[1, 2], recording, look, against or _hip_roll(recording))
     for ax in (*panels[0, :2], *panels[1, :2]):
         ax.set_xlabel("time [s]")
         if recording.tip is not None:
             _mark_tip(ax, recording.tip, recording.end.time)
+    if axes is not None:
+        return figure
     figure.suptitle(
         f"{recording.attrs['robot']} under {recording.attrs.get('controller', 'a controller')}, "
         f"{recording.end.time:.2f} s\n{textwrap.shorten(recording.end.message, 120)}",
@@ -91,19 +114,19 @@ def _colours(contacts: list[str]) -> dict[str, str]:
     return {name: _CONTACTS[k % len(_CONTACTS)] for k, name in enumerate(contacts)}
 
 
-def _handles(colour: dict[str, str]) -> list[Line2D]:
-    return [Line2D([], [], color=c, label=name) for name, c in colour.items()]
+def _handles(look: Looks) -> list[Line2D]:
+    return [Line2D([], [], color=c, label=words) for words, c in look.legend.items()]
 
 
-def _draw_forces(ax: Axes, recording: Recording, colour: dict[str, str]) -> None:
+def _draw_forces(ax: Axes, recording: Recording, look: Looks) -> None:
     share = recording["wrench"].sel(component="fz") / float(recording.attrs["weight"]) * 100
-    for name, c in colour.items():
+    for name, c in look.colour.items():
         ax.plot(recording["time"], share.sel(contact=name), color=c)
     shown = _for_scale(recording)["wrench"].sel(component="fz") / float(recording.attrs["weight"])
     most = float(np.nanmax(shown.values)) * 100
     ax.set_ylim(-5.0, 1.15 * max(most, 10.0))
     ax.set_ylabel("normal force [% of the weight]")
-    put_legend(ax, _handles(colour))
+    put_legend(ax, _handles(look))
 
 
 def _world_cop(recording: Recording, name: str) -> Float[np.ndarray, "N contact 2"]:
@@ -113,9 +136,9 @@ def _world_cop(recording: Recording, name: str) -> Float[np.ndarray, "N contact 
     return np.asarray(contact_origins(recording) + turned * MM)
 
 
-def _draw_cop(ax: Axes, recording: Recording, colour: dict[str, str]) -> None:
+def _draw_cop(ax: Axes, recording: Recording, look: Looks) -> None:
     cops, soles = _world_cop(recording, "cop"), world_soles(recording)
-    for k, (name, c) in enumerate(colour.items()):
+    for k, (name, c) in enumerate(look.colour.items()):
         sole, known = soles[k], cops[np.isfinite(cops[:, k, 0]), k, 0]
         found = (
             None
@@ -126,11 +149,11 @@ def _draw_cop(ax: Axes, recording: Recording, colour: dict[str, str]) -> None:
             ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
             for edge in found:
                 ax.axhline(edge, **EDGE_LINE)
-        ax.plot(recording["time"], cops[:, k, 1], color=c, label=name)
+        ax.plot(recording["time"], cops[:, k, 1], color=c, label=look.words[name])
     ax.plot(recording["time"], recording["com"].sel(com_axis="y") * MM, **COM_LINE)
     _limit(ax, recording)
     ax.set_ylabel("CoP y in the soles, world [mm]")
-    put_legend(ax, [*_handles(colour), Line2D([], [], label="CoM", **COM_LINE)])
+    put_legend(ax, [*_handles(look), Line2D([], [], label="CoM", **COM_LINE)])
 
 
 def _limit(ax: Axes, recording: Recording) -> None:
@@ -140,11 +163,11 @@ def _limit(ax: Axes, recording: Recording) -> None:
     ax.set_ylim(y.min() - room, y.max() + room)
 
 
-def _draw_above(ax: Axes, recording: Recording, colour: dict[str, str]) -> None:
+def _draw_above(ax: Axes, recording: Recording, look: Looks) -> None:
     stood = _standing(recording)
     cops, margin = _world_cop(stood, "cop"), stood["margin"].values
     draw_ground(ax, world_soles(recording), contact_origins(recording))
-    for k, c in enumerate(colour.values()):
+    for k, c in enumerate(look.colour.values()):
         draw_track(ax, cops[:, k], ~(margin[:, k] < 0), c, 2.4)
     com = stood["com"].values[:, :2] * MM
     ax.plot(com[:, 1], com[:, 0], zorder=4, **COM_LINE)
@@ -202,9 +225,7 @@ def _hip_roll(recording: Recording) -> str | None:
     return rolls[0] if rolls else None
 
 
-def _draw_against(
-    ax: Axes, recording: Recording, colour: dict[str, str], joint: str | None
-) -> None:
+def _draw_against(ax: Axes, recording: Recording, look: Looks, joint: str | None) -> None:
     """CoP y in each foot's frame against a joint or the CoM, the static prediction under it."""
     start = float(recording["com"].sel(com_axis="y").values[0])
     stood = _standing(recording)
@@ -212,9 +233,9 @@ def _draw_against(
     if joint is not None:
         x = stood["joint_position"].sel(joint=joint).values * DEG
         label = f"{joint}{_before(recording)} [deg]"
-    styles = line_styles(list(colour))
+    styles = line_styles(list(look.colour))
     if not np.any(np.isfinite(recording["margin"])):
-        _draw_loads(ax, stood, colour, x)
+        _draw_loads(ax, stood, look, x)
         ax.set_xlabel(label)
         return
     if "static_cop" in recording:
@@ -222,22 +243,25 @@ def _draw_against(
         if joint is not None:
             there = recording["static_joint"].sel(joint=joint).values * DEG
         within = (there >= x.min() - 0.5) & (there <= x.max() + 0.5)
-        for k in range(len(colour)):
+        for k in range(len(look.colour)):
             cop = np.where(within, recording["static_cop"].values[:, k, 1] * MM, np.nan)
             ax.plot(there, cop, **_STATIC)
-    for k, (name, c) in enumerate(colour.items()):
+    for k, (name, c) in enumerate(look.colour.items()):
         cop = stood["cop"].values[:, k, 1] * MM
         ax.plot(x, cop, color=c, linewidth=1.3, linestyle=styles[name])
     edges = _local_edges(stood)
     for k, found in edges.items():
         for edge in found:
-            ax.axhline(edge, **{**EDGE_LINE, "color": list(colour.values())[k]})
+            ax.axhline(edge, **{**EDGE_LINE, "color": list(look.colour.values())[k]})
     if edges:
         reach = 1.15 * float(np.abs(list(edges.values())).max())
         ax.set_ylim(-reach, reach)
     ax.set_xlabel(label)
     ax.set_ylabel("CoP y in the foot's frame [mm]")
-    handles = [Line2D([], [], color=c, linestyle=styles[n], label=n) for n, c in colour.items()]
+    handles = [
+        Line2D([], [], color=c, linestyle=styles[n], label=look.words[n])
+        for n, c in look.colour.items()
+    ]
     if "static_cop" in recording:
         handles.append(Line2D([], [], label="static", **{**_STATIC, "linewidth": 4.0}))
     if edges:
@@ -245,15 +269,13 @@ def _draw_against(
     put_legend(ax, handles)
 
 
-def _draw_loads(
-    ax: Axes, stood: Recording, colour: dict[str, str], x: Float[np.ndarray, " N"]
-) -> None:
+def _draw_loads(ax: Axes, stood: Recording, look: Looks, x: Float[np.ndarray, " N"]) -> None:
     """The loads of points, whose centres of pressure do not move."""
-    styles, share = line_styles(list(colour)), 100.0 / float(stood.attrs["weight"])
+    styles, share = line_styles(list(look.colour)), 100.0 / float(stood.attrs["weight"])
     loads = stood["wrench"].sel(component="fz").values * share
     handles = [
-        ax.plot(x, load, color=c, linestyle=styles[name], label=name)[0]
-        for load, (name, c) in zip(loads.T, colour.items(), strict=True)
+        ax.plot(x, load, color=c, linestyle=styles[name], label=look.words[name])[0]
+        for load, (name, c) in zip(loads.T, look.colour.items(), strict=True)
     ]
     ax.set_ylim(-5.0, 1.15 * float(max(np.nanmax(loads), 10.0)))
     ax.set_ylabel("normal force [% of the weight]")

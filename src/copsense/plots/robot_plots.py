@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -13,7 +13,16 @@ from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
 from copsense.plots.reading import MM, criterion_name
-from copsense.plots.style import COM_LINE, INK, MUTED, axes_or_new, colours, styled
+from copsense.plots.style import (
+    COM_LINE,
+    INK,
+    MUTED,
+    Color,
+    axes_or_new,
+    looks,
+    styled,
+    with_legend,
+)
 from copsense.sensitivity import CopSensitivity
 from copsense.skeleton import skeleton
 from copsense.stance import Stance
@@ -38,6 +47,8 @@ def plot_robot(
     *,
     side: Side = "behind",
     ax: Axes | None = None,
+    label: str | None = None,
+    color: Color = None,
     legend: bool = True,
 ) -> Axes:
     """Draw a robot's stick figure with its soles, its CoM over the ground, and the CoPs.
@@ -49,18 +60,24 @@ def plot_robot(
         stance: the posture.
         sensitivities: of that stance, one per criterion; default no CoPs.
         side: seen from ``"behind"``, so that left is left, or from the robot's ``"right"``.
-        ax: where to draw; default a new figure.
+        ax: where to draw; default a new figure. Robots in the same axes share a picture around all.
+        label: what the legend calls the robot; default nothing.
+        color: of the stick figure, or criterion -> color of its dots; default as in every figure.
         legend: whether to explain the marks.
 
     Raises:
-        InvalidInputError: another side, or `ax` is not one Matplotlib Axes.
+        InvalidInputError: another side, `ax` is not one Matplotlib Axes, or `color` is none.
     """
     if side not in SIDES:
         raise InvalidInputError(f"a robot is seen from {', '.join(SIDES)}, not from {side!r}.")
     ax = axes_or_new(ax, 3.6, 4.2)
+    shared = ax.has_data()
+    names = [criterion_name(s.equilibrium.criterion) for s in sensitivities]
+    ink = looks(["robot"], color).colour["robot"] if isinstance(color, str) else INK
+    colour = looks(names, color if isinstance(color, Mapping) else None).colour
     across = 1 if side == "behind" else 0
     bones, com, places = skeleton(stance) * MM, stance.com * MM, stance.placements
-    draw_bones(ax, bones, across)
+    draw_bones(ax, bones, across, color=ink)
     ground = min(float(place.translation[2]) for place in places) * MM
     outlines = []
     for contact, place in zip(stance.contacts, places, strict=True):
@@ -73,7 +90,6 @@ def plot_robot(
     ax.plot([com[across]] * 2, [ground, com[2]], zorder=4, **COM_LINE)
     ax.plot(com[across], com[2], "+", color=INK, markersize=13, markeredgewidth=2, zorder=6)
     ax.plot(com[across], ground, zorder=5, **RING)
-    colour = colours(criterion_name(s.equilibrium.criterion) for s in sensitivities)
     for number, (found, shade) in enumerate(zip(sensitivities, colour.values(), strict=True)):
         flat = np.column_stack([found.cop, np.zeros(len(found.cop))])
         cops = np.array(
@@ -82,22 +98,28 @@ def plot_robot(
         # The later ones smaller, so that none hides another.
         size = max(8.5 - 2.0 * number, 3.5)
         ax.plot(cops[:, across], cops[:, 2], "o", color=shade, markersize=size, zorder=7)
-    _frame(ax, np.vstack([bones.reshape(-1, 3), com[None], *outlines]), across)
+    _frame(ax, np.vstack([bones.reshape(-1, 3), com[None], *outlines]), across, shared)
     if legend:
         # Beside the robot, which is narrower than the words.
-        ax.legend(handles=_handles(colour), loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        mine = [Line2D([], [], color=ink, linewidth=1.6, label=label)] if label else []
+        handles = with_legend(ax, [*mine, *_handles(colour)])
+        ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 
 
 def draw_bones(
-    ax: Axes, bones: Float[np.ndarray, "s 2 3"], across: int, shade: float = 1.0
+    ax: Axes,
+    bones: Float[np.ndarray, "s 2 3"],
+    across: int,
+    shade: float = 1.0,
+    color: str = INK,
 ) -> None:
     """Draw segments over the world axis `across` (0 for x, 1 for y) and its height."""
     for segment in bones:
         ax.plot(
             segment[:, across],
             segment[:, 2],
-            color=INK,
+            color=color,
             alpha=shade,
             linewidth=1.6,
             solid_capstyle="round",
@@ -118,14 +140,18 @@ def _handles(colour: dict[str, str]) -> list[Line2D]:
     ]
 
 
-def _frame(ax: Axes, points: Float[np.ndarray, "k 3"], across: int) -> None:
+def _frame(ax: Axes, points: Float[np.ndarray, "k 3"], across: int, shared: bool) -> None:
+    """Equal scales and room around the points, and around what the axes had before."""
     low, high, sign = points.min(axis=0), points.max(axis=0), 1 if across == 1 else -1
     room = _ROOM * float((high - low).max())
     middle, height = (low + high)[across] / 2, float((high - low)[2]) + 2 * room
     # A robot that is thin from here has room for its marks and words all the same.
     half = max(float((high - low)[across]) / 2 + room, _NARROWEST * height / 2)
-    ax.set_xlim(middle + half * sign, middle - half * sign)
-    ax.set_ylim(low[2] - room, high[2] + room)
+    wide, tall = [middle - half, middle + half], [low[2] - room, high[2] + room]
+    if shared:
+        wide, tall = [*wide, *ax.get_xlim()], [*tall, *ax.get_ylim()]
+    ax.set_xlim(*sorted((min(wide), max(wide)), reverse=sign == 1))
+    ax.set_ylim(min(tall), max(tall))
     ax.set_aspect("equal")
     ax.xaxis.set_major_locator(MaxNLocator(3))
     ax.set_xlabel("← left  y [mm]  right →" if across == 1 else "x, forward [mm] →")

@@ -25,19 +25,51 @@ from copsense.plots.reading import (
     world_cops,
     world_soles,
 )
-from copsense.plots.style import INK, MUTED, OFF_SOLE, SOLE, colours, new_figure, styled
+from copsense.plots.style import (
+    INK,
+    MUTED,
+    OFF_SOLE,
+    SOLE,
+    Color,
+    Panels,
+    given_axes,
+    looks,
+    new_figure,
+    styled,
+    whole_figure,
+)
 from copsense.sweeps import Sweep
 
 _ROOM = 0.12  # of the feet's extent, around them
 
 
 @styled
-def plot_soles(sweep: Sweep) -> Figure:
-    """Draw from above where the CoPs go: a panel per criterion, coloured along the path."""
+def plot_soles(
+    sweep: Sweep,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Figure:
+    """Draw from above where the CoPs go: a panel per criterion, coloured along the path.
+
+    Args:
+        sweep: the sweep.
+        axes: where to draw, one for each criterion, without the bar of the path's colours; default
+            a new figure.
+        label: what the titles say, before the criterion's name where there are several.
+        color: of the title: of the only criterion, or criterion -> color; default as in every
+            figure.
+    """
     names = labels(sweep, "criterion")
-    figure = new_figure(4.1 * len(names) + 1.0, 4.6)
-    panels = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    x, colour, ramp = abscissa(sweep), colours(names), _ramp()
+    look = looks(names, color, label)
+    if axes is None:
+        figure: Figure = new_figure(4.1 * len(names) + 1.0, 4.6)
+        panels = list(figure.subplots(1, len(names), sharey=True, squeeze=False)[0])
+    else:
+        panels = given_axes(axes, names)
+        figure = whole_figure(panels[0])
+    x, ramp = abscissa(sweep), _ramp()
     shade = Normalize(float(x.values.min()), float(x.values.max()))
     cops, com = world_cops(sweep), sweep["com"].values[:, :2] * MM
     for j, (ax, name) in enumerate(zip(panels, names, strict=True)):
@@ -46,9 +78,11 @@ def plot_soles(sweep: Sweep) -> Figure:
             _draw_ramp(ax, cops[:, j, k], x.values, ramp, shade)
         ax.plot(com[:, 1], com[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
         frame_ground(ax, world_soles(sweep), contact_origins(sweep), cops)
-        ax.set_title(name, color=colour[name])
+        ax.set_title(look.words[name], color=look.colour[name])
     for ax in panels[1:]:
         ax.set_ylabel("")
+    if axes is not None:
+        return figure
     ramp_of = ScalarMappable(shade, ramp)
     bar = figure.colorbar(ramp_of, ax=list(panels), location="bottom", shrink=0.6, aspect=40)
     bar.set_label(f"{x.label}; dashed: the CoM's own track", fontsize=9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,9 +17,10 @@ from copsense.plots.sole_plots import draw_ground, frame_ground
 from copsense.plots.style import (
     INK,
     MUTED,
+    Color,
     Panels,
-    colours,
     given_axes,
+    looks,
     new_figure,
     styled,
     whole_figure,
@@ -39,6 +40,8 @@ def plot_stance(
     sensitivities: Sequence[CopSensitivity],
     *,
     axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
 ) -> Figure:
     """Draw a stance: the robot from behind and from its right, and each criterion from above.
 
@@ -51,6 +54,8 @@ def plot_stance(
         sensitivities: of that stance, one per criterion, at least one.
         axes: where to draw the criteria from above, one for each, without the robot (`plot_robot`
             draws it) and without a legend; default a new figure of both.
+        label: what the titles say, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
 
     Raises:
         InvalidInputError: there is no sensitivity, or one has another number of contacts; other
@@ -71,9 +76,10 @@ def plot_stance(
     ]
     com = stance.com[:2] * MM
     names = [criterion_name(s.equilibrium.criterion) for s in sensitivities]
-    colour = colours(names)
+    look = looks(names, color, label)
+    colour = look.colour
     if axes is None:
-        figure, panels = _with_robot(stance, sensitivities)
+        figure, panels = _with_robot(stance, sensitivities, colour)
     else:
         panels = given_axes(axes, names)
         figure = whole_figure(panels[0])
@@ -86,14 +92,14 @@ def plot_stance(
         ax.plot(com[1], com[0], "+", color=INK, markersize=13, markeredgewidth=2, zorder=6)
         frame_ground(ax, soles, origins, reach)
         _write_loads(ax, stance, result.result, soles, origins)
-        ax.set_title(name, color=colour[name])
+        ax.set_title(look.words[name], color=colour[name])
     for ax in panels[1:]:
         ax.set_ylabel("")
     return figure
 
 
 def _with_robot(
-    stance: Stance, sensitivities: Sequence[CopSensitivity]
+    stance: Stance, sensitivities: Sequence[CopSensitivity], colour: Mapping[str, str]
 ) -> tuple[Figure, list[Axes]]:
     """A figure with the robot on its left; the panels that are still to be drawn."""
     across, along, height = np.ptp(skeleton(stance).reshape(-1, 3), axis=0)
@@ -104,7 +110,7 @@ def _with_robot(
     grid = figure.add_gridspec(2, len(widths), width_ratios=widths)
     for k, side in enumerate(SIDES):
         ax = figure.add_subplot(grid[:, k] if tall else grid[k, 0])
-        plot_robot(stance, sensitivities, side=side, ax=ax, legend=False)
+        plot_robot(stance, sensitivities, side=side, ax=ax, color=colour, legend=False)
         if tall and k:
             ax.set_ylabel("")
     above: list[Axes] = []

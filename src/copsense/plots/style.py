@@ -14,6 +14,7 @@ from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure as Figure  # for modules that do not import matplotlib
@@ -99,9 +100,17 @@ class NotebookFigure(Figure):
         return render_figure(self, ".png", dpi=_NOTEBOOK_DPI)
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> NotebookFigure:
     """A figure [inches] without a window, unknown to pyplot."""
     return NotebookFigure(figsize=(width, height), layout="constrained")
+
+
+def new_axes(width: float, height: float, projection: str | None = None) -> Axes:
+    """Axes in a figure of their own [inches], which notebooks show."""
+    figure = new_figure(width, height)
+    ax = figure.add_subplot(projection=projection)
+    ax._repr_png_ = figure._repr_png_  # type: ignore[attr-defined]
+    return ax
 
 
 def axes_or_new(ax: Any, width: float = 4.9, height: float = 3.6) -> Axes:
@@ -111,7 +120,7 @@ def axes_or_new(ax: Any, width: float = 4.9, height: float = 3.6) -> Axes:
         InvalidInputError: what is given is not one Matplotlib Axes.
     """
     if ax is None:
-        return new_figure(width, height).add_subplot()
+        return new_axes(width, height)
     if not isinstance(ax, Axes):
         raise InvalidInputError(
             f"ax is one Matplotlib Axes, not a {type(ax).__name__}: of several, give one, such as "
@@ -163,7 +172,7 @@ def whole_figure(ax: Axes) -> Figure:
 
 @dataclass(frozen=True)
 class Looks:
-    """How criteria look in one figure.
+    """How criteria, or what else a figure tells apart by colour, look in it.
 
     Attributes:
         colour: of each.
@@ -179,13 +188,22 @@ class Looks:
         return {self.words[name]: shade for name, shade in self.colour.items()}
 
 
-def looks(names: Sequence[str], color: Color = None, label: str | None = None) -> Looks:
-    """The looks of criteria, those asked for where they are.
+def looks(
+    names: Sequence[str],
+    color: Color = None,
+    label: str | None = None,
+    *,
+    what: str = "criteria",
+    usual: Mapping[str, str] | None = None,
+) -> Looks:
+    """The looks of criteria, or of what else a figure tells apart by colour, those asked for first.
 
     Args:
         names: of the criteria.
         color: one colour for a single criterion, or criterion -> colour; the others keep theirs.
         label: what a legend says, before the criterion's name where there are several.
+        what: the criteria are, in an error's words.
+        usual: their colours where none is asked for; default a criterion's own.
 
     Raises:
         InvalidInputError: no colour, one colour for several criteria, or one of no criterion here.
@@ -196,10 +214,10 @@ def looks(names: Sequence[str], color: Color = None, label: str | None = None) -
     elif color is not None:
         if len(names) > 1:
             raise InvalidInputError(
-                f"one color for {len(names)} criteria would make them look alike: give "
-                f"color={{{names[0]!r}: {color!r}}}, or draw one, sweep.subset([{names[0]!r}])."
+                f"one color for {len(names)} {what} would make them look alike: give "
+                f"color={{{names[0]!r}: {color!r}}}, or draw one of them alone."
             )
-        asked = {names[0]: color}
+        asked = dict.fromkeys(names, color)
     for name, shade in asked.items():
         if name not in names:
             raise InvalidInputError(
@@ -212,7 +230,7 @@ def looks(names: Sequence[str], color: Color = None, label: str | None = None) -
     words = {name: name for name in names}
     if label is not None:
         words = {name: label if len(names) == 1 else f"{label}, {name}" for name in names}
-    return Looks(colours(names) | dict(asked), words)
+    return Looks(dict(colours(names) if usual is None else usual) | dict(asked), words)
 
 
 def colours(criteria: Iterable[str]) -> dict[str, str]:
@@ -249,16 +267,20 @@ def add_legend(
     put_legend(ax, [*handles, *extra])
 
 
-def put_legend(ax: Axes, handles: Sequence[Line2D]) -> None:
+def with_legend(ax: Axes, handles: Sequence[Artist]) -> list[Artist]:
+    """The handles of the legend that is there already, less those of the same words, and these."""
+    before = ax.get_legend()
+    kept = [] if before is None else [h for h in before.legend_handles if h is not None]
+    mine = {str(handle.get_label()) for handle in handles}
+    return [*(h for h in kept if str(h.get_label()) not in mine), *handles]
+
+
+def put_legend(ax: Axes, handles: Sequence[Artist]) -> None:
     """A legend over the axes, where it hides no line, in as many rows as it needs.
 
     What a legend that is there already explains, it explains too.
     """
-    before = ax.get_legend()
-    if before is not None:
-        mine = {str(handle.get_label()) for handle in handles}
-        kept = [h for h in before.legend_handles if h is not None]
-        handles = [*(h for h in kept if str(h.get_label()) not in mine), *handles]  # type: ignore[list-item]
+    handles = with_legend(ax, handles)
     width = ax.get_figure(root=True).get_figwidth() * ax.get_position().width  # type: ignore[union-attr]
     needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
     rows = math.ceil(needed / (_LETTERS * width))

@@ -31,45 +31,66 @@ from copsense.plots.style import (
     LIMIT_LINE,
     MUTED,
     OFF_SOLE,
-    colours,
+    Color,
+    Looks,
+    Panels,
+    given_axes,
     line_styles,
+    looks,
     new_figure,
+    put_legend,
     styled,
+    whole_figure,
 )
 from copsense.sweeps import Sweep
 
+_FOUR = ("the CoPs from above", "the CoPs between edges", "the loads", "the travel")
 _LINE, _HANDLE = 130, 8  # characters across the figure, and of a handle, in the legend's font
 
 
 @styled
-def plot_results(sweep: Sweep) -> Figure:
+def plot_results(
+    sweep: Sweep,
+    *,
+    axes: Panels | None = None,
+    label: str | None = None,
+    color: Color = None,
+) -> Figure:
     """Draw a sweep in one figure: from above, CoPs and edges, load shares, CoM travel.
 
     Margins to limits, of a sweep within limits or from `Sweep.with_limit_margins`, are drawn below,
     with a dotted line in each panel where a criterion meets its first limit.
+
+    Args:
+        sweep: the sweep.
+        axes: where to draw these four, and each kind of limit; the legend then is over the first of
+            them. Default a new figure.
+        label: what the legend says, before the criterion's name where there are several.
+        color: of the only criterion, or criterion -> color; default as in every figure.
     """
     kinds = limit_kinds(sweep) if "limit_margin" in sweep else []
-    figure = new_figure(9.0, 10.0 if kinds else 7.2)
-    n = max(len(kinds), 1)
-    grid = figure.add_gridspec(3 if kinds else 2, 2 * n)
-    above, cop, load, travel = (
-        figure.add_subplot(grid[i, j * n : (j + 1) * n]) for i in (0, 1) for j in (0, 1)
-    )
-    _draw_above(above, sweep)
-    plot_cop(sweep, axis=widest_axis(sweep), ax=cop, legend=False)
-    plot_load(sweep, ax=load, legend=False)
-    plot_travel(sweep, ax=travel, legend=False)
+    look = looks(labels(sweep, "criterion"), color, label)
+    colour = look.colour
+    panels = _panels(kinds) if axes is None else given_axes(axes, (*_FOUR, *kinds))
+    figure, (above, cop, load, travel, *below) = whole_figure(panels[0]), panels
+    _draw_above(above, sweep, colour)
+    plot_cop(sweep, axis=widest_axis(sweep), ax=cop, color=colour, legend=False)
+    plot_load(sweep, ax=load, color=colour, legend=False)
+    plot_travel(sweep, ax=travel, color=colour, legend=False)
     if kinds:
-        below = [figure.add_subplot(grid[2, 2 * i : 2 * i + 2]) for i in range(n)]
-        plot_limit_margins(sweep, axes=below, legend=False)
+        plot_limit_margins(sweep, axes=below, color=colour, legend=False)
         for ax in below[1:]:
             ax.set_ylabel(ax.get_ylabel().replace("smallest margin ", ""))
         for ax in (cop, load, travel):
-            mark_first_limits(ax, sweep)
+            mark_first_limits(ax, sweep, colour)
     above.set_title("where the CoPs go, from above")
     cop.set_title("CoPs between the soles' edges")
     load.set_title("who carries the weight")
     travel.set_title("how far the CoM may still go")
+    handles = _handles(sweep, look)
+    if axes is not None:
+        put_legend(above, handles)
+        return figure
     coordinate = abscissa(sweep).label.partition(" [")[0]
     count = sweep.sizes["posture"]
     figure.suptitle(
@@ -79,12 +100,20 @@ def plot_results(sweep: Sweep) -> Figure:
         fontsize=12.5,
         fontweight="bold",
     )
-    handles = _handles(sweep)
     needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
     columns = math.ceil(len(handles) / math.ceil(needed / _LINE))
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=9)
     figure.get_layout_engine().set(w_pad=0.07, h_pad=0.07)  # type: ignore[union-attr,call-arg]
     return figure
+
+
+def _panels(kinds: list[str]) -> list[Axes]:
+    """The panels of a figure of its own."""
+    figure = new_figure(9.0, 10.0 if kinds else 7.2)
+    n = max(len(kinds), 1)
+    grid = figure.add_gridspec(3 if kinds else 2, 2 * n)
+    four = [figure.add_subplot(grid[i, j * n : (j + 1) * n]) for i in (0, 1) for j in (0, 1)]
+    return four + [figure.add_subplot(grid[2, 2 * i : 2 * i + 2]) for i in range(len(kinds))]
 
 
 def widest_axis(sweep: Sweep) -> str:
@@ -97,10 +126,10 @@ def widest_axis(sweep: Sweep) -> str:
     return "y" if across >= along else "x"
 
 
-def _draw_above(ax: Axes, sweep: Sweep) -> None:
+def _draw_above(ax: Axes, sweep: Sweep, colour: dict[str, str]) -> None:
     """Every criterion's tracks in one picture, the later ones thinner so that all are visible."""
     names, cops, good = labels(sweep, "criterion"), world_cops(sweep), sweep.planted.values
-    colour, origins = colours(names), contact_origins(sweep)
+    origins = contact_origins(sweep)
     pulling = sweep["pulling"].values.astype(bool)
     draw_ground(ax, world_soles(sweep), origins)
     for j, name in enumerate(names):
@@ -114,9 +143,9 @@ def _draw_above(ax: Axes, sweep: Sweep) -> None:
     frame_ground(ax, world_soles(sweep), origins, np.vstack([com, cops.reshape(-1, 2)]))
 
 
-def _handles(sweep: Sweep) -> list[Line2D]:
+def _handles(sweep: Sweep, look: Looks) -> list[Line2D]:
     names, contacts = labels(sweep, "criterion"), labels(sweep, "contact")
-    handles = [Line2D([], [], color=c, label=n) for n, c in colours(names).items()]
+    handles = [Line2D([], [], color=c, label=n) for n, c in look.legend.items()]
     handles += [
         Line2D([], [], color=MUTED, linestyle=style, label=f"load on {name}")
         for name, style in line_styles(contacts).items()
