@@ -103,6 +103,8 @@ def main():
             if round_number:  # the first compiles and touches the memory
                 times[name].append((time.perf_counter() - start) / count * 1e6)
     first = statistics.median(times[next(iter(times))])
+    print("# What solving postures costs\n")
+    print("`python benchmarks/postures.py > benchmarks/postures.md`.\n")
     print(f"Python {platform.python_version()}, NumPy {np.__version__}, Numba {numba.__version__},")
     print(f"Pinocchio {pin.__version__}, {platform.machine()}, {platform.system()}.\n")
     print("| chart | us per row | least | ratio | solved | steps |\n|---|---|---|---|---|---|")
