@@ -12,7 +12,7 @@ from __future__ import annotations
 import importlib.util
 
 from copsense.description import Description
-from copsense.mjcf.mjcf_reading import MjcfReading
+from copsense.mjcf.mjcf_reading import MjcfReading, MjcfShape
 
 
 def read_mjcf(description: Description) -> MjcfReading:
@@ -33,4 +33,16 @@ def read_mjcf(description: Description) -> MjcfReading:
     return read_compiled(description)
 
 
-__all__ = ["MjcfReading", "read_mjcf"]
+def visible_shapes(description: Description) -> tuple[MjcfShape, ...] | None:
+    """What MuJoCo's viewer shows of a robot at first, on the joints of its `MjcfReading`.
+
+    None where MuJoCo is not installed. The file is compiled anew: nothing else needs its triangles.
+    """
+    if importlib.util.find_spec("mujoco") is None:
+        return None
+    from copsense.mjcf.compiled import read_drawn
+
+    return read_drawn(description)
+
+
+__all__ = ["MjcfReading", "read_mjcf", "visible_shapes"]

@@ -12,11 +12,11 @@ import pinocchio as pin
 from copsense.description import Description
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.mjcf.audit import check_against
-from copsense.mjcf.collision import collision_shapes
+from copsense.mjcf.collision import collision_shapes, drawn_shapes
 from copsense.mjcf.driving import read_drives
 from copsense.mjcf.effort import effort_limits
 from copsense.mjcf.gravity import usable_gravity
-from copsense.mjcf.mjcf_reading import MjcfReading
+from copsense.mjcf.mjcf_reading import MjcfReading, MjcfShape
 from copsense.mjcf.scene import find_robot, left_out
 from copsense.mjcf.tree_model import build_tree, pose
 from copsense.mjcf.unused import unused
@@ -44,6 +44,13 @@ def read_compiled(description: Description) -> MjcfReading:
     notes = (*warned, *said, *left_out(mj, root), *unused(mj, tree), *assumed)
     base = np.array(pose(np.zeros(3), mj.body_quat[root]).rotation)
     return MjcfReading(tree.model, collision_shapes(mj, tree), notes, drives, base)
+
+
+def read_drawn(description: Description) -> tuple[MjcfShape, ...]:
+    """What is seen of the robot of an MJCF; see `copsense.mjcf.visible_shapes`."""
+    mj, _, _ = compile_mjcf(description)
+    root = find_robot(mj, description.frames, description.root)
+    return drawn_shapes(mj, build_tree(mj, root))
 
 
 def compile_mjcf(description: Description) -> tuple[Any, str, tuple[str, ...]]:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from copsense.drives import Drives
 
 
 @dataclass(frozen=True, eq=False)
 class MjcfShape:
-    """A shape of a robot's link that meets other shapes.
+    """A shape of a robot's link.
 
     Attributes:
         name: its own, or made of its body's.
@@ -22,6 +22,7 @@ class MjcfShape:
         placement: its axes in that joint's.
         size: half sizes as MJCF has them, three numbers [m]; unused by meshes.
         vertices: of a mesh (k, 3), in the shape's axes [m]; empty otherwise.
+        faces: corners of a mesh's triangles (f, 3), where it is to be drawn; empty otherwise.
     """
 
     name: str
@@ -30,6 +31,9 @@ class MjcfShape:
     placement: pin.SE3
     size: Float[np.ndarray, " 3"]
     vertices: Float[np.ndarray, "k 3"] = field(repr=False)
+    faces: Int[np.ndarray, "f 3"] = field(
+        repr=False, default_factory=lambda: np.zeros((0, 3), dtype=np.int64)
+    )
 
 
 @dataclass(frozen=True, eq=False)

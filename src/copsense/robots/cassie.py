@@ -69,7 +69,11 @@ def cassie_robot(file: Path) -> Robot:
         "The leaf springs are held straight by couplings, whose torques are those that bend them.",
     )
     drives = replace(robot.drives, motors=MOTORS, couplings=couplings)
-    return replace(robot, model=_with_ends(robot), notes=notes, drives=drives)
+    assert robot.description is not None
+    # Where its meshes are: the text above has no folder of its own.
+    description = replace(robot.description, package_dirs=(str(file.parents[4]),))
+    model = _with_ends(robot)
+    return replace(robot, model=model, notes=notes, drives=drives, description=description)
 
 
 def cassie_contacts() -> tuple[Contact, ...]:
