@@ -9,8 +9,10 @@ import xarray as xr
 import copsense
 from copsense.batch import PostureChart
 from copsense.errors import CopsenseError
-from copsense.maps import Axis, Grid, Sample
+from copsense.maps import Axis, Grid, Sample, chunks
+from copsense.maps.chunks import ChunkEvaluator
 from copsense.maps.heights import height_advice
+from copsense.maps.map_plan import MapPlan
 
 
 def _grid_of(ranges):
@@ -83,6 +85,25 @@ def test_a_grid_unstacks_into_its_axes(icub, both, grid, tmp_path):
     dataset = copsense.load_map(tmp_path / "m.zarr")
     cube = dataset["com"].set_index(posture=list(grid.names)).unstack("posture")
     assert [cube.sizes[name] for name in grid.names] == list(grid.shape)
+
+
+def test_a_chunk_evaluated_in_pieces_is_the_same_bits(icub, both, sample, monkeypatch):
+    evaluator = ChunkEvaluator(MapPlan(icub, both, sample))
+    whole = evaluator.evaluate(0)
+    monkeypatch.setattr(chunks, "_PIECE", 23)
+    pieces = evaluator.evaluate(0)
+    assert whole.keys() == pieces.keys()
+    for name, rows in whole.items():
+        assert np.array_equal(rows, pieces[name], equal_nan=rows.dtype.kind == "f"), name
+
+
+def test_large_maps_have_large_chunks(icub, both):
+    sizes = [
+        MapPlan(icub, both, Sample((Axis("com_y", -0.01, 0.01),), count)).size
+        for count in (1, 262143, 262144)
+    ]
+    assert sizes == [4096, 4096, 16384]
+    assert MapPlan(icub, both, Sample((Axis("com_y", -0.01, 0.01),), 262144), chunk=7).size == 7
 
 
 def test_a_map_resumed_or_cut_among_threads_is_the_same_bits(

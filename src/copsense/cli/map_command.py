@@ -55,10 +55,9 @@ if TYPE_CHECKING:
 @click.option(
     "--chunk",
     type=int,
-    default=4096,
-    show_default=True,
     metavar="N",
-    help="Postures that are evaluated, written and resumed as one.",
+    help="Postures that are evaluated, written and resumed as one.  [default: 4096, or 16384 in a "
+    "map of 262144 or more]",
 )
 @click.option(
     "--threads", type=int, default=1, show_default=True, help="Chunks evaluated at a time."
@@ -91,7 +90,7 @@ def map_command(
     sequence: str,
     output: str,
     configurations: bool,
-    chunk: int,
+    chunk: int | None,
     threads: int,
     scheduler: str | None,
     local: int | None,

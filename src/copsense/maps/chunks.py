@@ -27,6 +27,8 @@ from copsense.margins import MarginTable, margin_table
 from copsense.reach import SWEPT, check_within_reach
 from copsense.statics import solve_equilibrium
 
+_PIECE = 4096  # postures that the kernel is given at a time
+
 
 class ChunkEvaluator:
     """A plan made ready to evaluate its chunks, in any order and from several threads.
@@ -60,10 +62,40 @@ class ChunkEvaluator:
         start, stop = self.plan.bounds(index)
         values = self.plan.sampling.values(start, stop)
         postures = self._chart.solve(values)
+        found: Chunk = dict(zip(self._names, np.ascontiguousarray(values.T), strict=True))
+        found |= self._unreached(postures)
         there = np.flatnonzero(postures.converged)
-        result = self._kernel.evaluate(postures.configurations[there])
-        status, reason = self._status(postures, there, result)
-        wide: Chunk = {
+        # In pieces: the kernel's answers are many times what is kept of them.
+        for first in range(0, max(len(there), 1), _PIECE):
+            rows = there[first : first + _PIECE]
+            answers = self._answers(postures.configurations[rows], rows, found)
+            for name, array in answers.items():
+                if name not in found:
+                    column = self._columns[name]
+                    shape = stop - start, *array.shape[1:]
+                    found[name] = np.full(shape, fill_value(column), column.dtype)
+                found[name][rows] = array
+        if self.plan.configurations:
+            found["configuration"] = postures.configurations
+        return found
+
+    def _unreached(self, postures: PostureBatch) -> Chunk:
+        """Status and reason before anything is evaluated."""
+        shape = len(postures), len(self.plan.criteria)
+        status = np.full(shape, EVALUATED, dtype=np.uint8)
+        reason = np.full(shape, "", dtype=object)
+        status[~postures.converged] = UNREACHABLE
+        for row in np.flatnonzero(~postures.converged):
+            reason[row] = postures.reasons[row]
+        return {"status": status, "reason": reason}
+
+    def _answers(self, configurations: np.ndarray, rows: np.ndarray, found: Chunk) -> Chunk:
+        """What the kernel answers at some rows; status and reason go into `found`."""
+        result = self._kernel.evaluate(configurations)
+        status, reason = found["status"], found["reason"]
+        for (i, j), why in result.reasons.items():
+            status[rows[i], j], reason[rows[i], j] = REJECTED, why
+        answers: Chunk = {
             "least_com_travel": result.com_travel.min(axis=-1),
             "largest_com_gain": _largest_singular_value(result.com_gain).max(axis=-1),
             "com_travel": result.com_travel,
@@ -75,58 +107,34 @@ class ChunkEvaluator:
             "com": result.com,
         }
         if self._table is not None:
-            wide["limit_margin"] = self._limits(
-                self._table, postures.configurations[there], result, there, status, reason
-            )
-        found: Chunk = dict(zip(self._names, np.ascontiguousarray(values.T), strict=True))
-        found |= {"status": status, "reason": reason}
-        for name, array in wide.items():
-            column = self._columns[name]
-            rows = np.full((stop - start, *array.shape[1:]), fill_value(column), column.dtype)
-            rows[there] = array
-            found[name] = rows
-        if self.plan.configurations:
-            found["configuration"] = postures.configurations
-        return found
-
-    def _status(
-        self, postures: PostureBatch, there: np.ndarray, result: BatchResult
-    ) -> tuple[np.ndarray, np.ndarray]:
-        shape = len(postures), len(self.plan.criteria)
-        status = np.full(shape, EVALUATED, dtype=np.uint8)
-        reason = np.full(shape, "", dtype=object)
-        status[~postures.converged] = UNREACHABLE
-        for row in np.flatnonzero(~postures.converged):
-            reason[row] = postures.reasons[row]
-        for (i, j), why in result.reasons.items():
-            status[there[i], j], reason[there[i], j] = REJECTED, why
-        return status, reason
+            answers["limit_margin"] = self._limits(self._table, configurations, result, rows, found)
+        return answers
 
     def _limits(
         self,
         table: MarginTable,
         configurations: np.ndarray,
         result: BatchResult,
-        there: np.ndarray,
-        status: np.ndarray,
-        reason: np.ndarray,
+        rows: np.ndarray,
+        found: Chunk,
     ) -> np.ndarray:
         """Margins of the criteria's own wrenches; marks the postures that the QP cannot solve."""
+        status, reason = found["status"], found["reason"]
         kinds = limit_kinds(table)
         members = [np.array([k == kind for k in table.kinds]) for kind in kinds]
-        margins = np.full((len(there), len(self.plan.criteria), len(kinds)), np.nan)
+        margins = np.full((len(configurations), len(self.plan.criteria), len(kinds)), np.nan)
         for i, q in enumerate(configurations):
             here = self.plan.stance.at(q, check=False)
             for j, criterion in enumerate(self.plan.criteria):
-                if status[there[i], j] != EVALUATED:
+                if status[rows[i], j] != EVALUATED:
                     continue
                 own = table.values(here.stack(result.wrenches[i, j]), result.torques[i, j])
-                margins[i, j] = [own[rows].min() for rows in members]
+                margins[i, j] = [own[those].min() for those in members]
                 try:
                     solve_equilibrium(here, criterion, self.plan.limits)
                 except CopsenseError as error:
                     broken = INFEASIBLE if isinstance(error, InfeasibleError) else UNSOLVED
-                    status[there[i], j], reason[there[i], j] = broken, str(error)
+                    status[rows[i], j], reason[rows[i], j] = broken, str(error)
         return margins
 
 

@@ -19,6 +19,7 @@ from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, with_tie_breaks
 
 FORMAT = 2  # of the store; counted up when what is written changes
+_SMALL, _LARGE, _MANY = 4096, 16384, 16  # postures of a chunk; the large ones from 16 chunks on
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,7 +31,8 @@ class MapPlan(ShortRepr):
         criteria: of distinct names.
         sampling: which postures.
         limits: what the wrenches must respect, or None.
-        chunk: postures of a chunk, the unit that is written and resumed.
+        chunk: postures of a chunk, the unit that is written and resumed; given as None, 4096, and
+            16384 in a map of 262144 or more, where each write would cost as much as the numbers.
         configurations: whether the configurations are stored too.
         notes: what to know about robot and criteria, such as a tie-break that one was given.
     """
@@ -39,7 +41,7 @@ class MapPlan(ShortRepr):
     criteria: Sequence[Criterion]
     sampling: Sampling
     limits: Limits | None = None
-    chunk: int = 4096
+    chunk: int | None = None
     configurations: bool = False
     notes: tuple[str, ...] = field(init=False, default=())
 
@@ -58,16 +60,24 @@ class MapPlan(ShortRepr):
                     f"a map takes criteria, not {criterion!r}: a policy's code cannot be "
                     "written into the store. Give Criterion values."
                 )
-        object.__setattr__(self, "chunk", whole_number(self.chunk, "the size of a chunk"))
+        size = _SMALL if len(self.sampling) < _MANY * _LARGE else _LARGE
+        given_size = size if self.chunk is None else self.chunk
+        object.__setattr__(self, "chunk", whole_number(given_size, "the size of a chunk"))
+
+    @property
+    def size(self) -> int:
+        """Number of postures of a chunk."""
+        assert self.chunk is not None  # since `__post_init__`
+        return self.chunk
 
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return math.ceil(len(self.sampling) / self.chunk)
+        return math.ceil(len(self.sampling) / self.size)
 
     def bounds(self, index: int) -> tuple[int, int]:
         """First posture of a chunk, and the one after its last."""
-        return index * self.chunk, min((index + 1) * self.chunk, len(self.sampling))
+        return index * self.size, min((index + 1) * self.size, len(self.sampling))
 
     def parameters(self) -> dict[str, Any]:
         """Everything that decides the numbers, as JSON would hold it."""
@@ -83,6 +93,6 @@ class MapPlan(ShortRepr):
             "criteria": [plain(c.to_dict()) for c in self.criteria],
             "limits": plain(self.limits),
             "sampling": sampling,
-            "chunk": int(self.chunk),
+            "chunk": self.size,
             "configurations": bool(self.configurations),
         }

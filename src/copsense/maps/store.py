@@ -318,7 +318,7 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
 
     for name, column in columns(plan).items():
         inner = tuple(sizes[d] for d in column.dims[1:])
-        array = add(group, name, column, (min(plan.chunk, count), *inner))
+        array = add(group, name, column, (min(plan.size, count), *inner))
         if name == "status":
             array.attrs["flag_values"] = [*range(len(STATUS)), PENDING]
             array.attrs["flag_meanings"] = " ".join([*STATUS, "pending"])
