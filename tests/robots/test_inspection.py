@@ -308,3 +308,54 @@ def test_a_robot_whose_contacts_hold_the_com_sideways_says_so(tmp_path):
     found = inspect_robot(written(tmp_path, walker(PITCH_ONLY)))
     assert found.line is not None
     assert any("hold the CoM's y fast" in note and "Move CoM x" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("axes", "base"), [(None, None), (BACK, "180"), (SIDE, "270")])
+def test_axes_of_a_turned_foot_are_those_of_the_robot_that_faces_ahead(tmp_path, axes, base):
+    """The foot's frame has x up and z backward, however the trunk is drawn."""
+    foot = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    found = inspect_robot(written(tmp_path, walker(base=axes, foot=foot)))
+    words = shlex.split(str(found.line))
+    assert (f"--base-yaw={base}" in words) == (base is not None)
+    for each in found.feet:
+        np.testing.assert_allclose(each.contact.rotation, foot.T, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(each.sole.size, (0.2, 0.08), rtol=0, atol=1e-9)
+    axes_said = "its x, y, z are the frame's -z, +y, +x"
+    assert str(found).count(f"; {axes_said}") == 2
+    assert run(str(found.line)).err.count(axes_said) == 2
+
+
+def test_a_knee_beside_its_hip_is_as_straight_as_one_under_it(tmp_path):
+    """Joints stand anywhere along their axes: a thigh that goes out by 0.2 m bends no knee."""
+    text = walker()
+    for side, out in (("l", 0.2), ("r", -0.2)):
+        knee = f'<joint name="{side}_knee" type="revolute"><origin xyz="0.0 0.0 -0.3"'
+        assert knee in text
+        text = text.replace(knee, knee.replace("0.0 0.0 -0.3", f"0.0 {out} -0.3"))
+    posture = inspect_robot(written(tmp_path, text)).line.posture
+    assert posture["l_knee"] == posture["r_knee"] == pytest.approx(np.radians(30))
+
+
+def test_knees_are_bent_under_hips_of_which_no_joint_alone_pitches_the_thigh(tmp_path):
+    """Three axes askew, at right angles to each other, turn it together."""
+    third = np.sqrt(1 / 3)
+    across = np.array([[1, 0, -1], [1, -2, 1]]) / np.sqrt([[2], [6]])
+    turn = np.vstack([across[0], [third] * 3, across[1]])  # its columns are the axes
+    hips = [(name, " ".join(map(str, turn[:, i]))) for i, name in enumerate("abc")]
+    joints = [*hips, *FULL[3:]]
+    text = walker(joints)
+    # The thigh hangs under the last of the hip's joints.
+    for side in "lr":
+        knee = f'<joint name="{side}_knee" type="revolute"><origin xyz="0.0 0.0 0.0"'
+        assert knee in text
+        text = text.replace(knee, knee.replace("0.0 0.0 0.0", "0.0 0.0 -0.3"))
+    found = inspect_robot(written(tmp_path, text))
+    posture = found.line.posture
+    assert posture["l_knee"] == pytest.approx(np.radians(30))
+    robot = found.robot
+    q = robot.configuration({name: at for name, at in posture.items() if name.startswith("l_")})
+    place = cs.Stance(robot, q, [cs.Contact("l_foot")], check=False).placements[0]
+    # The sole stays level, and the foot is under the hip but for rounding to a tenth of a degree.
+    np.testing.assert_allclose(place.rotation, np.eye(3), rtol=0, atol=5e-3)
+    np.testing.assert_allclose(place.translation[:2], (0.0, 0.1), rtol=0, atol=3e-3)
+    assert run(str(found.line)).code == 0

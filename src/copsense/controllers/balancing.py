@@ -44,7 +44,10 @@ from copsense.limits import Limits, optional_limits
 from copsense.load_problem import LoadProblem
 from copsense.stance import Stance, check_stance
 
-_RANK = 1e-10  # relative pivot under which the contacts are taken as redundant
+# Mobility, relative to the largest, under which the contacts are taken as redundant. So is what a
+# leg within some tenths of a degree of straight lets move: with a knee's sine in the denominator,
+# a micrometre of the CoM's height would ask for all of its torque.
+_RANK = 1e-6
 
 
 class BalancingController:

@@ -80,15 +80,18 @@ class ShareWithinLimits:
         forces: Float[np.ndarray, " m"],
         Z: Float[np.ndarray, "m z"],
     ) -> Float[np.ndarray, " m"] | None:
-        """Of forces + Z y within the limits those of least cost; None where none are found."""
+        """Of forces + Z y within the limits those of least cost; None where none are found.
+
+        A tie-break whose own program is not solved leaves what those before it have found.
+        """
         A, b = self._rows.over_forces(problem)
         left = b - A.dot(forces)
-        for choice in choices:
+        for number, choice in enumerate(choices):
             flat = Z.T.dot(choice.free) if choice.free.shape[1] else None
             cost, slope = Z.T.dot(choice.H).dot(Z), Z.T.dot(choice.H.dot(forces) - choice.g)
             y = quick_optimum(cost, slope, A.dot(Z), left, self._weight, flat)
             if y is None:
-                return None
+                return forces if number else None
             # Along what is free these are one optimum of many: the next cost starts from it.
             forces, Z = forces + Z.dot(y), choice.free
             left = np.maximum(b - A.dot(forces), 0.0)

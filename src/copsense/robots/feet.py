@@ -120,6 +120,27 @@ def find_feet(
     return tuple(feet), notes
 
 
+def faced_feet(
+    robot: Robot, feet: tuple[Foot, ...], q: Float[np.ndarray, " nq"], geometry: Geometry
+) -> tuple[Foot, ...]:
+    """The feet with their contacts as they are turned where the robot faces along the world's x.
+
+    Args:
+        robot: the robot.
+        feet: as `find_feet` found them.
+        q: its configuration at rest, the base upright and facing along x.
+        geometry: whose soles are read.
+    """
+    found = []
+    for foot in feet:
+        if foot.sole is not None and not np.array_equal(foot.contact.rotation, np.eye(3)):
+            contact = _upright(robot, foot.frame, q)
+            sole = read_sole(robot, contact, geometry=geometry)
+            foot = replace(foot, contact=contact, sole=sole)
+        found.append(foot)
+    return tuple(found)
+
+
 def _depths(robot: Robot, data: pin.Data) -> dict[int, float]:
     """Joint -> height of the lowest frame that it carries [m]."""
     depths: dict[int, float] = {}
@@ -211,10 +232,7 @@ def _foot(
     """The foot that a joint carries, by the frame that describes it best."""
     frame = _best_frame(robot, data, joint, points)
     place = data.oMf[robot.frame_id(frame)]
-    contact = Contact(frame)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # said again when the robot stands
-        contact = upright_contacts(robot, (contact,), q)[0]
+    contact = _upright(robot, frame, q)
     try:
         sole = read_sole(robot, contact, geometry=geometry)
     except CopsenseError as error:
@@ -225,6 +243,13 @@ def _foot(
     x, y = (sole.polygon.min(axis=0) + sole.polygon.max(axis=0)) / 2
     middle = place.act(contact.rotation @ np.array([x, y, sole.height]))
     return Foot(frame, joint, "surface", sole, contact, middle)
+
+
+def _upright(robot: Robot, frame: str, q: Float[np.ndarray, " nq"]) -> Contact:
+    """The contact at a frame, turned where its z axis is not up."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # said again when the robot stands
+        return upright_contacts(robot, (Contact(frame),), q)[0]
 
 
 def _best_frame(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
@@ -14,6 +16,9 @@ _CLEAR = 0.4  # of the limbs' reach: how far off their ends' middle has to be to
 _PARALLEL = 0.9  # cosine from which axes count as parallel
 _PLAINLY = 0.5  # joints more about one horizontal axis than about the other
 _AHEAD = 0.05  # of its length: a sole set off less from its ankle does not say where ahead is
+_STRAIGHT = np.radians(15.0)  # knees bent less are straight
+_SPANNED = 0.3  # of axes that turn a thigh any way: the least singular value
+_NEWTON = 8  # steps
 _TURNS = {  # axis of the base that is up -> roll, pitch, yaw [deg] that turn it there
     (0, 1): (0.0, -90.0, 0.0),
     (0, -1): (0.0, 90.0, 0.0),
@@ -110,22 +115,37 @@ def _knees_axis(
     return np.asarray(axes[0])
 
 
+@dataclass(frozen=True)
+class StraightLeg:
+    """The joints of a leg whose knee is straight.
+
+    Attributes:
+        hips: that pitch the thigh: one, or several that do so together.
+        knee: its knee.
+        ankle: its ankle; None over a point.
+    """
+
+    hips: tuple[str, ...]
+    knee: str
+    ankle: str | None
+
+
 def straight_legs(
     robot: Robot, q: Float[np.ndarray, " nq"], feet: tuple[Foot, ...], heading: float
-) -> tuple[tuple[str, ...], ...]:
-    """Hip, knee and ankle of each leg (no ankle over a point) whose knee is straight."""
+) -> tuple[StraightLeg, ...]:
+    """The legs whose knee is straight at a configuration, for a heading [deg]."""
     legs = []
     for foot in feet:
-        leg = _pitch_joints(robot, q, foot, heading)
-        if leg is not None and _knee_angle(robot, q, leg, foot) < np.radians(15.0):
-            legs.append(tuple(leg))
+        leg = _leg(robot, q, foot, heading)
+        if leg is not None and _knee_angle(robot, q, leg, foot, heading) < _STRAIGHT:
+            legs.append(leg)
     return tuple(legs)
 
 
 def bent_knees(
     robot: Robot,
     q: Float[np.ndarray, " nq"],
-    legs: tuple[tuple[str, ...], ...],
+    legs: tuple[StraightLeg, ...],
     heading: float,
     bend: float,
 ) -> dict[str, float]:
@@ -133,37 +153,75 @@ def bent_knees(
     lower, upper = robot.position_limits
     posture: dict[str, float] = {}
     for leg in legs:
-        signs = [_sign(robot, q, joint, heading) for joint in leg]
-        shares = (-bend / 2, bend, -bend / 2)[: len(leg)]
-        here = [robot.joint_position(q, joint) for joint in leg]
-        found = {}
         for way in (1.0, -1.0):
-            found = {
-                joint: at + way * sign * share
-                for joint, at, sign, share in zip(leg, here, signs, shares, strict=True)
+            found = _pitched(robot, q, leg.hips, heading, -way * bend / 2)
+            shares = ((leg.knee, bend), (leg.ankle, -bend / 2))
+            found |= {
+                joint: robot.joint_position(q, joint)
+                + way * _sign(robot, q, joint, heading) * share
+                for joint, share in shares
+                if joint is not None
             }
-            index = [robot.velocity_index(joint) - robot.base_nv for joint in leg]
-            if all(lower[i] <= found[j] <= upper[i] for i, j in zip(index, leg, strict=True)):
+            index = [robot.velocity_index(joint) - robot.base_nv for joint in found]
+            if all(lower[i] <= at <= upper[i] for i, at in zip(index, found.values(), strict=True)):
                 posture |= found
                 break
     return posture
 
 
-def _pitch_joints(
+def _leg(
     robot: Robot, q: Float[np.ndarray, " nq"], foot: Foot, heading: float
-) -> list[str] | None:
-    """The last joints of a leg that turn about the lateral axis: hip, knee (and ankle)."""
+) -> StraightLeg | None:
+    """The last joints of a leg that turn about the lateral axis: hip, knee (and ankle).
+
+    Where a hip has no such joint of its own, all that turn above the knee pitch the thigh together,
+    if they can.
+    """
     names = [robot.model.names[i] for i in _limb(robot, foot)]
     pitch = [name for name in names if abs(_axis(robot, q, name, heading)) > 0.8]
-    need = 3 if foot.kind == "surface" else 2
-    return pitch[-need:] if len(pitch) >= need else None
+    below = 2 if foot.kind == "surface" else 1
+    if len(pitch) < below:
+        return None
+    knee, ankle = pitch[-below], pitch[-1] if below == 2 else None
+    if len(pitch) > below:
+        return StraightLeg((pitch[-below - 1],), knee, ankle)
+    hips = tuple(names[: names.index(knee)])
+    axes = np.array([_turning_axis(robot, q, robot.model.getJointId(name)) for name in hips])
+    if not hips or np.linalg.matrix_rank(axes, tol=_SPANNED) < 3:
+        return None
+    return StraightLeg(hips, knee, ankle)
+
+
+def _pitched(
+    robot: Robot, q: Float[np.ndarray, " nq"], hips: tuple[str, ...], heading: float, angle: float
+) -> dict[str, float]:
+    """Positions [rad] of hip joints that turn the thigh about the robot's left by an angle."""
+    here = {joint: robot.joint_position(q, joint) for joint in hips}
+    if len(hips) == 1:
+        return {joint: at + _sign(robot, q, joint, heading) * angle for joint, at in here.items()}
+    model, data, moved = robot.model, robot.model.createData(), np.array(q)
+    last = model.getJointId(hips[-1])
+    columns = [robot.velocity_index(joint) for joint in hips]
+    pin.forwardKinematics(model, data, moved)
+    wanted = pin.exp3(_left(heading) * angle) @ data.oMi[last].rotation
+    for _ in range(_NEWTON):
+        axes = np.array([_turning_axis(robot, moved, model.getJointId(joint)) for joint in hips]).T
+        pin.forwardKinematics(model, data, moved)
+        step = np.zeros(model.nv)
+        step[columns] = np.linalg.lstsq(axes, pin.log3(wanted @ data.oMi[last].rotation.T))[0]
+        moved = pin.integrate(model, moved, step)
+    # To a tenth of a degree: where the posture goes is decided by the ground.
+    return {j: float(np.radians(np.degrees(robot.joint_position(moved, j)).round(1))) for j in hips}
 
 
 def _axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:
     """Part of a joint's axis along the robot's left; zero for a joint of another kind."""
-    turn = _turning_axis(robot, q, robot.model.getJointId(joint))
-    left = np.array([-np.sin(np.radians(heading)), np.cos(np.radians(heading)), 0.0])
-    return float(turn @ left)
+    return float(_turning_axis(robot, q, robot.model.getJointId(joint)) @ _left(heading))
+
+
+def _left(heading: float) -> Float[np.ndarray, " 3"]:
+    """The robot's left in the world."""
+    return np.array([-np.sin(np.radians(heading)), np.cos(np.radians(heading)), 0.0])
 
 
 def _turning_axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: int) -> Float[np.ndarray, " 3"]:
@@ -185,12 +243,20 @@ def _sign(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float)
     return 1.0 if _axis(robot, q, joint, heading) > 0 else -1.0
 
 
-def _knee_angle(robot: Robot, q: Float[np.ndarray, " nq"], leg: list[str], foot: Foot) -> float:
-    """Angle [rad] between thigh and shin."""
+def _knee_angle(
+    robot: Robot, q: Float[np.ndarray, " nq"], leg: StraightLeg, foot: Foot, heading: float
+) -> float:
+    """Angle [rad] between thigh and shin as seen from the robot's side.
+
+    Joints stand anywhere along their axes: a thigh beside its hip does not bend the knee.
+    """
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
-    places = [data.oMi[robot.model.getJointId(joint)].translation for joint in leg]
-    end = places[2] if len(leg) == 3 else foot.middle
-    thigh, shin = places[1] - places[0], end - places[1]
+    hip, knee = (data.oMi[robot.model.getJointId(j)].translation for j in (leg.hips[-1], leg.knee))
+    end = foot.middle
+    if leg.ankle is not None:
+        end = data.oMi[robot.model.getJointId(leg.ankle)].translation
+    left = _left(heading)
+    thigh, shin = (line - (line @ left) * left for line in (knee - hip, end - knee))
     cosine = thigh @ shin / max(float(np.linalg.norm(thigh) * np.linalg.norm(shin)), 1e-12)
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -18,7 +18,7 @@ from copsense.json_data import json_data
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
 from copsense.robots.contact_soles import ContactAt, tip_text
-from copsense.robots.feet import Foot, find_feet
+from copsense.robots.feet import Foot, faced_feet, find_feet
 from copsense.robots.heading import bent_knees, facing, straight_legs, upright_base
 from copsense.robots.presets import PRESETS
 from copsense.robots.standing import load_robot, rest_positions
@@ -211,6 +211,9 @@ def inspect_robot(
                 "(--soles visual).",
             )
     heading, why = facing(robot, q, feet)
+    rpy = (turn[0], turn[1], (360.0 - (heading or 0.0)) % 360.0)
+    if heading:
+        feet = faced_feet(robot, feet, _turned(robot, rest, rpy), geometry)
     start = AnalyseLine(
         named,
         contact_at=contact_at if own else None,
@@ -240,7 +243,6 @@ def inspect_robot(
     bent: list[dict[str, float]] = [
         bent_knees(robot, q, legs, heading or 0.0, np.radians(bend)) for bend in _BENDS if legs
     ]
-    rpy = (turn[0], turn[1], (360.0 - (heading or 0.0)) % 360.0)
     lines = lines_to_try(replace(start, base_rpy=rpy), feet, [*bent, {}])
     found, reason, said = first_that_stands(lines, lambda line: line.stand(robot, None, ()))
     levelled = not own and found is not None and found.level_soles

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
+_SLIGHT = 1e-7  # likewise, where rows that all but meet in one corner leave no finer one
 _ZERO = 1e-12  # norm of a row that limits nothing
 _UNBOUNDED = 1e30  # as the solver writes infinity
 _QUICK = 1e-6  # violation of a condition, relative, that a control loop accepts
@@ -66,13 +67,30 @@ def quick_optimum(
     size = float(np.abs(H).max()) or 1.0
     length = np.maximum(np.sqrt((A * A).sum(axis=1)), _ZERO)
     rows, bound, H, h = A / length[:, None], b / length, H / size, h / size
-    curved, drawn, best = H, h, None
     if flat is not None:
         H, h = H - flat.dot(flat.T.dot(H)), h - flat.dot(flat.T.dot(h))
         H = H - H.dot(flat).dot(flat.T)
-        curved, drawn = H + _FLAT * flat.dot(flat.T), h
+    for tolerance in (_FEASIBLE, _SLIGHT):
+        best = _proximal_steps(H, h, rows, bound, unit, flat, tolerance)
+        if best is not None:
+            return best
+    return None
+
+
+def _proximal_steps(
+    H: Float[np.ndarray, "z z"],
+    h: Float[np.ndarray, " z"],
+    rows: Float[np.ndarray, "r z"],
+    bound: Float[np.ndarray, " r"],
+    unit: float,
+    flat: Float[np.ndarray, "z k"] | None,
+    tolerance: float,
+) -> Float[np.ndarray, " z"] | None:
+    """The optimum of a cost of unit size that is flat along `flat`; None where none was found."""
+    curved = H if flat is None else H + _FLAT * flat.dot(flat.T)
+    drawn, best = h, None
     for _ in range(1 if flat is None else _STEPS):
-        y, flag, l = dual_active_set(curved, drawn, rows, bound, primal_tol=_FEASIBLE * unit)
+        y, flag, l = dual_active_set(curved, drawn, rows, bound, primal_tol=tolerance * unit)
         if flag < 1:
             break
         # Of the cost itself: what a proximal step pulls is an error.
