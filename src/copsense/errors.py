@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 _LISTED = 40  # names that an error lists at most
+_FEW = 3  # clauses of a sentence that lists what is wrong with each of several
 
 
 class CopsenseError(Exception):
@@ -222,6 +223,32 @@ class InfeasibleError(CopsenseError):
     def __reduce__(self) -> tuple[Any, ...]:
         """As `UnknownNameError.__reduce__`."""
         return type(self), (self.violation, self.demands)
+
+
+class ImpossibleInertiaError(InvalidInputError):
+    """A robot whose links have inertias that no body has, where motion is asked for.
+
+    Attributes:
+        robot: its name.
+        links: what is wrong, a clause for each link.
+    """
+
+    def __init__(self, robot: str, links: Sequence[str]) -> None:
+        """Compose the message."""
+        self.robot: str = robot
+        self.links: tuple[str, ...] = tuple(links)
+        more = f"; and {len(links) - _FEW} more" if len(links) > _FEW else ""
+        super().__init__(
+            f"robot {robot!r} cannot be simulated: {'; '.join(links[:_FEW])}{more}, which no body "
+            "has (they are positive, and none is greater than the other two together). Correct the "
+            "file, or let them be replaced (copsense balance --repair-inertia, "
+            "copsense.inertias.repair_inertias(robot)). Statics do not feel them: analyse, sweep, "
+            "design, map and push work."
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As `UnknownNameError.__reduce__`."""
+        return type(self), (self.robot, self.links)
 
 
 class UnsolvedError(CopsenseError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
@@ -21,6 +22,8 @@ _AXES = (
 )
 _STILL = 1e-4  # m, per unit of motion: what moves the CoM less leaves it where it is
 _ALIKE = 0.02  # singular values under which constraints all but say the same; usual are 0.05 up
+_ELSEWHERE = 0.6  # rad, m: joints moved by so much bend a straight limb
+_STRAIGHT = 0.02  # singular value of a straight limb, in shares of its usual one
 _SHARE = 0.01  # share of a lost direction from which a rotation is said to be missing
 
 
@@ -141,6 +144,41 @@ def repetition_notes(stance: Stance) -> tuple[str, ...]:
     )
 
 
+def straight_note(stance: Stance) -> str:
+    """Which limbs are all but straight, and the joints to bend; "" where none is.
+
+    The joints of a straight limb do not bring its contact nearer, and its motors do not feel the
+    load along it. It is found as a direction that the limb's joints move far better elsewhere.
+    """
+    tied = _tied_joints(stance)
+    random = np.random.default_rng(0)
+    robot = stance.robot
+    away = np.zeros(robot.model.nv)
+    away[robot.base_nv :] = random.uniform(-_ELSEWHERE, _ELSEWHERE, len(robot.dof_names))
+    elsewhere = stance.at(pin.integrate(robot.model, stance.q, away), check=False)
+    limbs, bends = [], []
+    for contact, rows in zip(stance.contacts, stance.rows, strict=True):
+        if tied.intersection(stance.limb(contact)):
+            continue
+        columns = _limb_columns(stance, contact)
+        usual = np.linalg.svd(elsewhere.jacobian[rows][:, columns], compute_uv=False)
+        rank = int(np.sum(usual > RANK_TOLERANCE))
+        _, sizes, turns = np.linalg.svd(stance.jacobian[rows][:, columns])
+        if rank and sizes[rank - 1] < _STRAIGHT * usual[rank - 1]:
+            limbs.append(contact.name)
+            most = int(np.argmax(np.abs(turns[rank - 1])))
+            bends.append(robot.dof_names[columns[most] - robot.base_nv])
+    if not limbs:
+        return ""
+    plural = len(limbs) > 1
+    return (
+        f"the limb{'s' * plural} of {listed(limbs)} {'are' if plural else 'is'} all but straight: "
+        f"motors do not feel the load along {'them' if plural else 'it'}, and the least change of "
+        f"height asks for torques without end. Bend {listed(list(dict.fromkeys(bends)))} "
+        "(--posture, posture=)."
+    )
+
+
 def hanging_notes(stance: Stance) -> tuple[str, ...]:
     """What no motor, contact, loop or coupling holds, and whether it would stay; empty for none."""
     motions = stance.hanging_motions
@@ -170,13 +208,16 @@ def _tied_joints(stance: Stance) -> set[int]:
     }
 
 
+def _limb_columns(stance: Stance, contact: Contact) -> list[int]:
+    """Where the joints from the base to a contact stand in a velocity."""
+    joints = stance.robot.model.joints
+    return [joints[i].idx_v + k for i in stance.limb(contact) for k in range(joints[i].nv)]
+
+
 def _lacking(stance: Stance, contact: Contact) -> list[str]:
     """Axes of a contact frame along or about which its limb cannot move it, rotations first."""
-    model, rows = stance.robot.model, stance.rows[stance.contact_names.index(contact.name)]
-    columns = [
-        model.joints[i].idx_v + k for i in stance.limb(contact) for k in range(model.joints[i].nv)
-    ]
-    u, s, _ = np.linalg.svd(stance.jacobian[rows][:, columns])
+    rows = stance.rows[stance.contact_names.index(contact.name)]
+    u, s, _ = np.linalg.svd(stance.jacobian[rows][:, _limb_columns(stance, contact)])
     lost = u[:, int(np.sum(s > RANK_TOLERANCE)) :]
     named: list[int] = []
     while lost.shape[1]:

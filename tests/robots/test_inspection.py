@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support.commands import copsense
 from support.tiny import urdf as tiny
-from support.walkers import BIPED, FOUR, FULL, PITCH_ONLY, walker
+from support.walkers import BIPED, FOUR, FULL, PITCH_ONLY, walker, with_toes
 
 import copsense as cs
 from copsense.robots import inspect_robot, soles_read
@@ -272,16 +272,7 @@ def test_tilted_soles_are_named_with_their_angle_and_levelled_by_the_line(tmp_pa
 
 def test_a_foot_that_rests_on_its_edge_is_preferred_to_toes_that_reach_lower(tmp_path):
     text = walker(limits={"pitch": (0.03, 0.2)})  # toes down by 4 degrees at rest
-    box = '<collision><origin xyz="0.02 0 0"/><geometry><box size="0.03 0.08 0.02"/></geometry>'
-    for side in "lr":
-        toe = (
-            f'<link name="{side}_toes"><inertial><mass value="0.1"/><inertia ixx="1e-4" ixy="0" '
-            f'ixz="0" iyy="1e-4" iyz="0" izz="1e-4"/></inertial>{box}</collision></link>'
-            f'<joint name="{side}_toe" type="revolute"><origin xyz="0.13 0 -0.04"/><parent '
-            f'link="{side}_foot"/><child link="{side}_toes"/><axis xyz="0 1 0"/>'
-            '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
-        )
-        text = text.replace("</robot>", toe)
+    text = with_toes(text)
     found = inspect_robot(written(tmp_path, text))
     assert [foot.frame for foot in found.feet] == BIPED
 

@@ -122,5 +122,24 @@ def walker(
     return '<robot name="walker">' + "".join(parts) + "</robot>"
 
 
+def with_toes(text, length=0.03, inertia=1e-4):
+    """A biped with hinged toes of 80 mm width before its feet, their undersides level."""
+    box = (
+        f'<collision><origin xyz="{length / 2 + 0.005} 0 0"/><geometry>'
+        f'<box size="{length} 0.08 0.02"/></geometry>'
+    )
+    for side in "lr":
+        toe = (
+            f'<link name="{side}_toes"><inertial><mass value="0.1"/><inertia ixx="{inertia}" '
+            f'ixy="0" ixz="0" iyy="{inertia}" iyz="0" izz="{inertia}"/></inertial>{box}'
+            "</collision></link>"
+            f'<joint name="{side}_toe" type="revolute"><origin xyz="0.13 0 -0.04"/><parent '
+            f'link="{side}_foot"/><child link="{side}_toes"/><axis xyz="0 1 0"/>'
+            '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
+        )
+        text = text.replace("</robot>", toe)
+    return text
+
+
 BIPED = ["l_foot", "r_foot"]
 FOUR = {"fl": (0.2, 0.1), "fr": (0.2, -0.1), "hl": (-0.2, 0.1), "hr": (-0.2, -0.1)}

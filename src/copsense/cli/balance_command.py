@@ -9,6 +9,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -79,6 +80,12 @@ _TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure ma
     help="Measure wrenches as the engine's contact forces, or by six-axis sensors over the feet.",
 )
 @click.option(
+    "--repair-inertia",
+    is_flag=True,
+    help="Replace inertias that no body has, as a file may give its links, by a ball's, and say "
+    "which. Masses and statics stay.",
+)
+@click.option(
     "--until",
     type=click.Choice(["tip", "fall"]),
     default="fall",
@@ -103,6 +110,7 @@ def balance(
     controller: str | None,
     control_period: float,
     wrenches: Any,
+    repair_inertia: bool,
     until: Any,
     output: str | None,
     picture: str | None,
@@ -119,6 +127,7 @@ def balance(
     Ctrl-C ends the run and keeps what was recorded.
     """
     from copsense.files import check_output
+    from copsense.inertias import repair_inertias
     from copsense.simulation import Scenario
     from copsense.simulation import balance as run
     from copsense.simulation.balance_run import natural_duration
@@ -151,6 +160,10 @@ def balance(
             "one of them out."
         )
     stance, allowed = read_stance(robot, **options), read_limits(limits)
+    if repair_inertia:
+        known = stance.robot.notes
+        stance = replace(stance, robot=repair_inertias(stance.robot))
+        echo_notes(note for note in stance.robot.notes if note not in known)
     scenario.check_stance(stance)
     criterion = read_criterion(criteria, characteristic_length)
     own = None if controller is None else read_own_controller(controller, gain, stance)
@@ -233,6 +246,8 @@ def _print(recording: Recording) -> None:
         )
     else:
         click.echo("  no contact tipped")
+    if attributes.get("likely_cause"):
+        click.echo(f"  likely cause: {attributes['likely_cause']}")
     if attributes.get("static_statement"):
         click.echo(f"  static prediction: {attributes['static_statement']}")
     if attributes.get("quasi_static_share", 0.0) > _TOO_FAST:

@@ -23,6 +23,7 @@ from copsense.errors import InvalidInputError
 from copsense.freedom import hanging_notes, repetition_notes
 from copsense.limits import Limits, check_limits
 from copsense.simulation.control_loop import rollout
+from copsense.simulation.end_cause import likely_cause
 from copsense.simulation.mujoco_simulator import MujocoSimulator
 from copsense.simulation.prediction import predict
 from copsense.simulation.recording import Recording
@@ -74,7 +75,8 @@ def balance(
         stop: asked before every control period; true ends the run.
 
     Returns:
-        The recording, with ``static_*`` beside what was measured.
+        The recording, with ``static_*`` beside what was measured, and ``likely_cause``, why it
+        tipped or fell.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -112,10 +114,11 @@ def balance(
         )
     ground = scenario.friction_at_start(stance, simulator.settings.friction)
     prediction = None if predicted is None else predict(path, predicted, limits, ground)
+    scenario = replace(scenario, reference=path)
     recording = rollout(
         simulator,
         controller,
-        replace(scenario, reference=path),
+        scenario,
         until=until,
         progress=progress,
         stop=stop,
@@ -125,6 +128,9 @@ def balance(
     timed = () if prediction is None else filter(None, (timed_note(path),))
     recording = recording.with_notes(
         (*notes, *timed, *repetition_notes(stance), *hanging_notes(stance))
+    )
+    recording = recording.with_attributes(
+        likely_cause=likely_cause(recording, stance, scenario, controller, prediction)
     )
     return recording if prediction is None else prediction.attach(recording)
 

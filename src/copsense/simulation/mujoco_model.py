@@ -14,7 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.contact import Contact
-from copsense.errors import InvalidInputError
+from copsense.errors import ImpossibleInertiaError, InvalidInputError
+from copsense.inertias import carried_links, impossible_inertias
 from copsense.robot import Robot
 from copsense.simulation.mujoco_drives import add_drives, driven_joints, quaternion
 from copsense.simulation.physics_settings import PhysicsSettings
@@ -65,10 +66,13 @@ def build_model(mujoco: Any, stance: Stance, settings: PhysicsSettings, *, senso
     try:
         return spec.compile()
     except ValueError as error:
+        impossible = impossible_inertias(robot)
+        if impossible:
+            raise ImpossibleInertiaError(robot.name, list(impossible.values())) from None
         # MuJoCo's remedies are options of its own file format.
         reason, _, where = str(error).strip().removeprefix("Error: ").partition("\n")
         named = re.search(r"'body (.+)'", where)
-        link = f" of the link behind joint {named[1]!r}" if named else ""
+        link = f" of {carried_links(model, model.getJointId(named[1]))}" if named else ""
         raise InvalidInputError(
             f"MuJoCo cannot simulate robot {robot.name!r}: {reason.split(';')[0]}{link}. Give its "
             "links physical masses and inertias."

@@ -165,6 +165,7 @@ class Recording(LabelledResult):
             "robot": attributes.get("robot", ""),
             "controller": attributes.get("controller", ""),
             "end": {"kind": end.kind, "reason": end.message, "time": end.time},
+            "likely_cause": attributes.get("likely_cause", ""),
             "com_error_rms": self.tracking_error,
             "com_error_peak": self.tracking_peak,
             "smallest_margin": self.smallest_margin,
@@ -228,6 +229,8 @@ class Recording(LabelledResult):
         """What the representation says under its heading."""
         tip, end = self.tip, self.end
         lines = [f"  end: {end.message}"]
+        if self.attrs.get("likely_cause"):
+            lines.append(f"  likely cause: {self.attrs['likely_cause']}")
         if tip is not None:
             lines.append(
                 f"  first tip at {tip.time:.2f} s, CoM y {self.tip_travel * 1e3:+.1f} mm from the "
