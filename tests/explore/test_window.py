@@ -4,7 +4,6 @@ import json
 import os
 import re
 import shlex
-import shutil
 import signal
 import socket
 import subprocess
@@ -15,6 +14,7 @@ import urllib.request
 from dataclasses import replace
 
 import pytest
+from support.browser import chromium
 from support.commands import copsense as command
 
 from copsense.errors import OutputError
@@ -29,11 +29,8 @@ import zstandard  # noqa: E402
 from websockets.sync.client import connect  # noqa: E402
 
 from copsense.explore.explorer import Explorer  # noqa: E402
-from copsense.explore.export import page_of  # noqa: E402
 from copsense.explore.server import GuardedServer  # noqa: E402
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-ARGUMENTS = ["--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-extensions"]
 CAMERA = {
     "type": "ViewerCameraMessage",
     "wxyz": (1.0, 0.0, 0.0, 0.0),
@@ -222,14 +219,8 @@ def test_the_command_prints_its_address_alone_and_ends_on_a_signal(tmp_path):
 
 @pytest.fixture(scope="module")
 def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    executable = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if executable is None:
-        pytest.skip(f"no browser found; looked for {', '.join(BROWSERS)}")
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=executable, args=ARGUMENTS)
+    with chromium() as browser:
         yield browser
-        browser.close()
 
 
 def test_in_a_browser_a_slider_changes_the_table(browser, explorer):
@@ -254,28 +245,3 @@ def test_in_a_browser_a_slider_changes_the_table(browser, explorer):
     assert f"{1e3 * found.margin[1]:.1f} to +y" in page.locator("table").inner_text()
     assert errors == []
     page.close()
-
-
-def test_an_exported_page_needs_nothing_but_itself(browser, icub, tmp_path):
-    path = tmp_path / "page.html"
-    state = State(("icub",), {"com_y": Setting(0.03, "m")})
-    text = page_of(Model(icub), state)
-    path.write_text(text, encoding="utf-8")
-    assert "CC-BY-SA" not in text  # the stick figure is nobody's
-    context = browser.new_context(offline=True)
-    page = context.new_page()
-    requests, errors = [], []
-    page.on("request", lambda request: requests.append(request.url))
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(path.as_uri())
-    frame = page.frames[1]
-    frame.wait_for_function("window.__viserMutable && window.__viserMutable.scene", timeout=60_000)
-    drawn = frame.evaluate("Object.keys(window.__viserMutable.nodeRefFromName || {}).length")
-    assert drawn > 5
-    assert page.locator("table").inner_text().count("r_sole") == 2
-    assert "copsense analyse icub --com-y 0.03m" in page.locator("code").inner_text()
-    outside = [u for u in requests if not u.startswith(("file:", "data:", "blob:", "about:"))]
-    assert outside == []
-    assert [u for u in requests if u.startswith("file:")] == [path.as_uri()]
-    assert errors == []
-    context.close()

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,8 @@ from copsense.controllers.target import Hold, Sine, lateral_reference
 from copsense.design import LENGTHS, families
 from copsense.errors import CopsenseError
 from copsense.explore import Model, Setting, State
-from copsense.explore.playback import Playback
+from copsense.explore.export import played_views
+from copsense.explore.played_model import PlayedModel
 from copsense.explore.shape import JointMesh
 from copsense.identification import Measurements, identify
 from copsense.labelled import LabelledResult
@@ -33,6 +33,7 @@ from copsense.maps.marginals import Marginal
 from copsense.maps.sampling import Axis, Grid
 from copsense.margins import margin_table
 from copsense.path import LateralPath
+from copsense.posture_run import PostureRun
 from copsense.pushes import push_limits
 from copsense.robots import PRESETS, inspect_robot
 from copsense.scan import limit_travel, next_active_set_change
@@ -111,6 +112,8 @@ def all_results(icub) -> dict[str, object]:
     kernel = BatchKernel(bar, [TORQUE])
     explored = Model(icub)
     shown = explored.view(State(limits=copsense.Limits(), overlays=frozenset({"regions"})))
+    log = small_log(icub)
+    swaying_views = played_views(PlayedModel(align_log(log, icub).run(log)), explored.start, [0, 5])
     return {
         "stance": icub,
         "driven stance": driven,
@@ -208,9 +211,8 @@ def all_results(icub) -> dict[str, object]:
             np.zeros((1, 2, 40)),
         ),
         "state": State(("icub",), {"com_y": Setting(0.01, "m")}, limits=LIMITS),
-        "playback": Playback(
-            Path("run.nc"), "time", "s", np.zeros(1), bar.q[None], np.zeros(1, dtype=int), None
-        ),
+        "run": PostureRun.of_stances(path.stances, path.values, "com_y", "m"),
+        "view of a run": swaying_views[1],
         "mesh": JointMesh(1, np.zeros((3, 3)), np.arange(3)[None]),
         "view": explored.add_regions(shown),
         "case": make_plan(

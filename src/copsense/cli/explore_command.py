@@ -10,7 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
-from copsense.cli.printing import echo_json, echo_written
+from copsense.cli.printing import echo_json, echo_written, progress_bar
 from copsense.cli.stance_memory import remembered_stance, written
 from copsense.cli.stance_options import read_stance, stance_options, standing_options
 from copsense.cli.units import read_coordinates, read_positions
@@ -58,8 +58,15 @@ _NOT_WHERE_IT_STANDS = ("limits", "save_stance", "force_stance")  # of `standing
 @click.option(
     "--recording",
     type=click.Path(dir_okay=False),
-    help="Play a file of copsense balance or copsense sweep (.nc) instead of moving the robot, its "
-    "measured centres of pressure beside the criteria's; with --export as a film in the page.",
+    help="Play a file of copsense balance or copsense sweep (.nc), or a robot's own log, instead "
+    "of moving the robot: measured centres of pressure beside the criteria's at rest and in "
+    "motion; with --export as a film in the page.",
+)
+@click.option(
+    "--map",
+    "map_file",
+    metavar="MAP.toml",
+    help="Which signal of a log is what, as copsense log --save-map writes it.",
 )
 @click.option("--force", is_flag=True, help="Overwrite the page.")
 @click.option("--json", "as_json", is_flag=True, help="Print the address as JSON.")
@@ -77,6 +84,7 @@ def explore(
     export: str | None,
     meshes: bool,
     recording: str | None,
+    map_file: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -108,18 +116,23 @@ def explore(
     words = stance_words(sys.argv[1:])
     criteria_of_file = file.criteria or None if file else None
     limits_of_file = file.limits if file else None
+    if recording is None and map_file is not None:
+        raise InvalidInputError("--map is of a log that --recording plays.")
     if recording is None:
         model = Model(stance, words, criteria=criteria_of_file, limits=limits_of_file)
     else:
-        from copsense.explore.playback import Playback, PlayedModel
+        from copsense.explore.playback import load_run
+        from copsense.explore.played_model import PlayedModel
 
         if joints or at or any(value is not None for value in asked.values()):
             raise InvalidInputError(
                 "--recording says where the robot is, and so do --com-x, --com-y, --com-z, --joint "
                 "and --at. Give one of them."
             )
-        played = Playback.load(recording, stance)
-        model = PlayedModel(stance, played, words, criteria=criteria_of_file, limits=limits_of_file)
+        size = Path(recording).stat().st_size if Path(recording).is_file() else None
+        with progress_bar(size, f"reading {Path(recording).name}", "B") as advance:
+            run = load_run(recording, stance, map_file, advance)
+        model = PlayedModel(run, words, criteria=criteria_of_file, limits=limits_of_file)
     coordinates = {n: Setting(v, "m") for n, v in asked.items() if v is not None}
     for name, value in read_positions(joints, stance.robot).items():
         coordinates[name] = Setting(value, stance.robot.joint_unit(name))
@@ -146,9 +159,10 @@ def explore(
         folders = options["package_dirs"] or folders
         written(model.posture(state), kept, source, overwrite, folders)
     if export is not None:
-        from copsense.explore.export import export_page
+        from copsense.explore.export import export_page, frames_of
 
-        export_page(model, state, Path(export), meshes=meshes, overwrite=force)
+        with progress_bar(frames_of(model), "drawing", "frame") as advance:
+            export_page(model, state, Path(export), meshes=meshes, overwrite=force, advance=advance)
         echo_written(export)
         return
     _serve(model, state, port, host, no_browser, not no_meshes, light, dark, as_json)

@@ -14,7 +14,6 @@ from copsense.explore.view import CriterionView, View
 Colour = tuple[int, int, int]
 
 BONE: Colour = (150, 160, 172)
-MEASURED: Colour = (120, 30, 160)
 
 
 class Inks(NamedTuple):
@@ -23,16 +22,19 @@ class Inks(NamedTuple):
     line: Colour
     sole: Colour
     ground: Colour
+    measured: Colour
 
 
-ON_LIGHT = Inks((29, 39, 51), (70, 84, 99), (205, 212, 219))
-ON_DARK = Inks((226, 231, 237), (160, 174, 190), (74, 82, 92))
+ON_LIGHT = Inks((29, 39, 51), (70, 84, 99), (205, 212, 219), (120, 30, 160))
+ON_DARK = Inks((226, 231, 237), (160, 174, 190), (74, 82, 92), (215, 130, 250))
 # As in the figures: the paper's two criteria, then others in order.
 NAMED: Mapping[str, Colour] = {"minimum-wrench": (213, 94, 0), "minimum-torque": (0, 114, 178)}
 OTHERS: tuple[Colour, ...] = ((0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 SHADES = 24  # steps of the torque colours: else each tick sends every joint's
 _COLD, _MILD, _HOT = np.array([(196, 204, 212), (240, 200, 80), (200, 30, 30)], dtype=float)
 OPACITY = 0.6  # of meshes at first: what counts is inside the feet
+# Hundredths of the robot's height: what was measured is behind what should be there.
+_FORMS: Mapping[str, tuple[float, float]] = {"square": (1.5, 3.0), "diamond": (3.0, 2.0)}
 _LIFT = 0.002  # m: outlines over the ground, so that they do not flicker
 
 
@@ -70,11 +72,11 @@ def look_at(view: View) -> tuple[np.ndarray, float]:
     return (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.2)
 
 
-def place_camera(server: Any, view: View) -> None:
-    """Have the robot in the picture when a browser connects."""
+def place_camera(server: Any, view: View, distance: float = 1.0) -> None:
+    """Have the robot in the picture when a browser connects; nearer with less distance."""
     middle, size = look_at(view)
     server.initial_camera.look_at = middle
-    server.initial_camera.position = middle + size * np.array([1.05, -0.7, 0.3])
+    server.initial_camera.position = middle + distance * size * np.array([1.05, -0.7, 0.3])
 
 
 def effort_colour(share: float) -> Colour:
@@ -127,7 +129,7 @@ class Scene:
         self._balls: dict[str, list[Any]] = {}
         self._arrows: dict[str, Any] = {}
         self._outlines: dict[str, Any] = {}
-        self._reference: Any = None
+        self._clouds: dict[str, Any] = {}
 
     def show(self, view: View, shown: Shown) -> None:
         """Draw a view; call it within ``server.atomic()``."""
@@ -142,17 +144,29 @@ class Scene:
         colours = criterion_colours([each.name for each in view.criteria])
         self._show_criteria(view, shown, colours)
         self._show_regions(view, shown, colours)
+        self._show_motion(view, colours)
 
-    def show_reference(self, points: np.ndarray | None) -> None:
-        """Where measured centres of pressure are, in the world; None for none."""
-        if self._reference is None and points is not None:
-            self._reference = self._scene.add_point_cloud(
-                "/measured", points, MEASURED, point_size=2.2 * self._unit, point_shape="diamond"
-            )
-        if self._reference is not None:
-            self._reference.visible = points is not None
-            if points is not None:
-                self._reference.points = points.astype(np.float32)
+    def _show_motion(self, view: View, colours: Mapping[str, Colour]) -> None:
+        """Centres of pressure in motion as squares, and measured ones as diamonds."""
+        shown = {
+            f"/in motion/{each.name}": (each.moving_cop_world, colours[each.name], "square")
+            for each in view.criteria
+            if each.moving_cop_world is not None
+        }
+        if view.measured is not None:
+            shown["/measured"] = (view.measured, self._inks.measured, "diamond")
+        for name in self._clouds.keys() - shown:
+            _assign(self._clouds[name], visible=False)
+        for name, (places, colour, form) in shown.items():
+            size, lift = _FORMS[form]
+            points = places[np.isfinite(places).all(axis=1)] + np.array([0.0, 0.0, lift * _LIFT])
+            if name not in self._clouds:
+                self._clouds[name] = self._scene.add_point_cloud(
+                    name, points, colour, point_size=size * self._unit, point_shape=form
+                )
+            _assign(self._clouds[name], visible=bool(len(points)))
+            if len(points):
+                self._clouds[name].points = points.astype(np.float32)
 
     def _light(self, light: bool) -> None:
         self._scene.set_up_direction("+z")

@@ -15,7 +15,7 @@ from copsense.errors import CopsenseError
 from copsense.explore.drawing import Scene, look_at, place_camera
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
-from copsense.explore.playback import PlayedModel
+from copsense.explore.played_model import PlayedModel
 from copsense.explore.server import LOOPBACK, GuardedServer
 from copsense.explore.shape import Shape, load_shape
 from copsense.explore.state import State
@@ -103,7 +103,7 @@ class Explorer:
                 "front": self._from_front,
                 "save stance": self._save,
             },
-            playback=model.playback if isinstance(model, PlayedModel) else None,
+            run=model.run if isinstance(model, PlayedModel) else None,
         )
         self._scene = Scene(viser, first, self._shape, light=light, dark=dark)
         self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
@@ -160,8 +160,6 @@ class Explorer:
         )
         with viser.atomic():
             self._scene.show(view, self._panel.shown())
-            if isinstance(self.model, PlayedModel) and view.row is not None:
-                self._scene.show_reference(self.model.measured(view.row))
             self._panel.write(view, status, self._saved)
         viser.flush()
 

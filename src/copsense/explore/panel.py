@@ -21,10 +21,11 @@ from copsense.explore.panel_html import (
     status_html,
     table_html,
 )
-from copsense.explore.playback import SWEEP_SECONDS, Playback
+from copsense.explore.playback import run_seconds
 from copsense.explore.state import Setting, State, weights_text
 from copsense.explore.view import View
 from copsense.limits import Limits
+from copsense.posture_run import PostureRun
 
 NEAREST, HELD = "nearest posture", "base held"
 MESHES, STICKS, HIDDEN = "meshes", "stick figure", "hidden"
@@ -56,7 +57,7 @@ class Panel:
         meshes: bool,
         changed: Callable[[], object],
         actions: Mapping[str, Callable[[], object]],
-        playback: Playback | None = None,
+        run: PostureRun | None = None,
     ) -> None:
         """Lay out the controls.
 
@@ -67,7 +68,7 @@ class Panel:
             meshes: whether there are any to show.
             changed: called when anything was changed.
             actions: label of a button -> what it does.
-            playback: what is played instead of moving the robot.
+            run: what is played instead of moving the robot.
         """
         self._gui, self._model, self._changed = server.gui, model, changed
         self._assigning = False
@@ -81,25 +82,25 @@ class Panel:
         self._copy = gui.add_html("")
         buttons = gui.add_button_group("", tuple(actions))
         buttons.on_click(lambda event: actions[event.target.value]())
-        self._playback = playback
-        self._playing(playback)
+        self._run = run
+        self._playing(run)
         self._coordinates(state)
         self._judging(state)
         self._showing(meshes)
         self._more = gui.add_html("")
 
-    def _playing(self, playback: Playback | None) -> None:
-        if playback is None:
+    def _playing(self, run: PostureRun | None) -> None:
+        if run is None:
             return
         gui = self._gui
-        low, high = float(playback.values.min()), float(playback.values.max())
+        low, high = float(run.values.min()), float(run.values.max())
         with gui.add_folder("Playback"):
             self._time = gui.add_slider(
-                f"{playback.axis} [{playback.unit}]",
+                f"{run.axis} [{run.unit}]" if run.unit else run.axis,
                 min=low,
                 max=max(high, low + 1e-6),
                 step=max((high - low) / 1000.0, 1e-6),
-                initial_value=float(playback.values[0]),
+                initial_value=float(run.values[0]),
             )
             self._time.on_update(self._any)
             self._play = gui.add_checkbox("play", False)
@@ -107,16 +108,16 @@ class Panel:
 
     @property
     def row(self) -> int:
-        """The row of the playback that is shown."""
-        assert self._playback is not None
-        return int(np.argmin(np.abs(self._playback.values - self._time.value)))
+        """The row of the run that is shown."""
+        assert self._run is not None
+        return int(np.argmin(np.abs(self._run.values - self._time.value)))
 
     def advance(self, seconds: float) -> bool:
         """Go on by so many seconds, round at the end; whether it is played at all."""
-        playback = self._playback
-        if playback is None or not self._play.value:
+        run = self._run
+        if run is None or not self._play.value:
             return False
-        rate = 1.0 if playback.axis == "time" else (self._time.max - self._time.min) / SWEEP_SECONDS
+        rate = (self._time.max - self._time.min) / max(run_seconds(run), 1e-3)
         value = self._time.value + seconds * rate * float(self._speed.value)
         with self._silently():
             self._time.value = value if value <= self._time.max else self._time.min
@@ -124,7 +125,7 @@ class Panel:
 
     def _coordinates(self, state: State) -> None:
         gui = self._gui
-        moved = self._playback is None
+        moved = self._run is None
         self._sliders: dict[str, Any] = {}
         self._folders: dict[str, Any] = {}
         with gui.add_folder("Posture", visible=moved):
@@ -379,7 +380,7 @@ class Panel:
             if self._curve is not None:
                 self._curve.visible = False
             return
-        played, name, unit = self._playback, "CoM y", "m"
+        played, name, unit = self._run, "CoM y", "m"
         now = float(view.com[1])
         if played is not None:
             name, unit = played.axis, played.unit
@@ -453,7 +454,7 @@ class Panel:
 
     def _show_kinds(self, held: bool) -> None:
         for kind in ("trunk", "foot"):
-            if kind in self._folders and self._playback is None:
+            if kind in self._folders and self._run is None:
                 self._folders[kind].visible = held
 
     @contextmanager

@@ -105,7 +105,7 @@ def copy_html(model: Model, state: State, save: str) -> str:
 
 def notes_html(view: View) -> str:
     """What binds, and what else to know."""
-    lines = [*(view.binding or ()), *view.notes]
+    lines = [*view.motion_lines, *(view.binding or ()), *view.notes]
     for each in view.criteria:
         lines += [f"{each.name}, active: {'; '.join(each.active[:6])}"] * bool(each.active)
         lines += [f"{each.name}, nearest: {'; '.join(each.nearest)}"] * bool(each.nearest)

@@ -1,207 +1,184 @@
-"""Playback: postures that were recorded or swept, one after the other, with what was measured."""
+"""Playback: files of balance, sweep and logs as runs of postures that can be played."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
 
-from copsense.content import ShortRepr, freeze
-from copsense.criterion import Criterion
-from copsense.errors import CopsenseError, InvalidInputError
-from copsense.explore.model import Model, Stale, least_margin
-from copsense.explore.state import State
-from copsense.explore.view import View, posture_parts
+from copsense.errors import InvalidInputError
 from copsense.extras import require
-from copsense.limits import Limits
+from copsense.logs import read_log
+from copsense.logs.aligned_log import align_log
+from copsense.logs.log_motion import put_on_base, smooth_motion, smoothing_window
+from copsense.posture_run import PostureRun
 from copsense.provenance import model_digest
+from copsense.simulation import Recording
 from copsense.stance import Stance
+from copsense.sweeps import Sweep
 
+RECORDED = ".nc"
 SWEEP_SECONDS = 5.0  # that a sweep takes from end to end
-_CURVE_POINTS = 60
+_FREQUENCY = 2.0  # Hz: what is slower than this is not smoothed away
+_MOST = 2000  # frames of a film
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Playback(ShortRepr):
-    """Postures in order, from a file of `copsense balance` or `copsense sweep`.
-
-    Attributes:
-        path: the file.
-        axis: what `values` are: ``"time"`` or the coordinate that was swept.
-        unit: of them.
-        values: one for each posture, rising or falling (N,).
-        configurations: the postures (N, nq).
-        rows: which rows of the file they are; those without a posture are left out (N,).
-        measured: centres of pressure in contact axes (N, nc, 2) [m], NaN where a contact carries
-            nothing; None where nothing was measured.
-    """
-
-    path: Path
-    axis: str
-    unit: str
-    values: Float[np.ndarray, " N"]
-    configurations: Float[np.ndarray, "N nq"]
-    rows: Int[np.ndarray, " N"]
-    measured: Float[np.ndarray, "N nc 2"] | None
-
-    def __post_init__(self) -> None:
-        """Own the arrays."""
-        freeze(self, "values", "configurations", "rows")
-        if self.measured is not None:
-            freeze(self, "measured")
-
-    def __len__(self) -> int:
-        """Number of postures."""
-        return len(self.values)
-
-    @classmethod
-    def load(cls, path: str | Path, stance: Stance) -> Playback:
-        """Read a file of `copsense balance --output` or `copsense sweep --output`.
-
-        Args:
-            path: netCDF.
-            stance: the robot and the contacts it was made of.
-
-        Raises:
-            InvalidInputError: no such file, something else, or of another robot.
-            MissingExtraError: xarray is not installed.
-        """
-        require("xarray", "playing a recording")
-        from copsense.simulation import Recording
-        from copsense.sweeps import Sweep
-
-        source: Any
-        try:
-            source = Recording.load(path)
-            axis, unit, measured = "time", "s", source["cop"].values
-        except InvalidInputError as error:
-            try:
-                source = Sweep.load(path)
-            except InvalidInputError:
-                raise error from None
-            axis = str(source.attrs["coordinate"])
-            unit, measured = str(source[axis].attrs.get("units", "")), None
-        if source.attrs.get("model_digest") != model_digest(stance):
-            raise InvalidInputError(
-                f"{path} is of another stance: its robot is {source.attrs.get('robot')!r} "
-                f"on {', '.join(str(name) for name in source['contact'].values)}, or one of them "
-                "has changed since. Explore the stance that it was made of, with the same options."
-            )
-        values, q = np.asarray(source[axis].values, float), source["configuration"].values
-        whole = np.isfinite(q).all(axis=1)
-        if not whole.any():
-            raise InvalidInputError(f"{path} holds no posture. Play another file.")
-        kept = None if measured is None else measured[whole]
-        return cls(Path(path), axis, unit, values[whole], q[whole], np.flatnonzero(whole), kept)
-
-
-class PlayedModel(Model):
-    """A model whose posture is a row of a playback; criteria and limits are those of the state.
-
-    Attributes:
-        playback: the postures.
-        row: which one is shown.
-    """
-
-    playback: Playback
-    row: int
-
-    def __init__(
-        self,
-        stance: Stance,
-        playback: Playback,
-        words: Sequence[str] = (),
-        *,
-        criteria: Sequence[Criterion] | None = None,
-        limits: Limits | None = None,
-    ) -> None:
-        """Begin with the first row; the other arguments are those of `Model`."""
-        super().__init__(stance, words, criteria=criteria, limits=limits)
-        self.playback, self.row = playback, 0
-        self._along: dict[State, tuple[np.ndarray, np.ndarray]] = {}
-
-    def posture(self, state: State) -> Stance:
-        """The posture of the row, whatever the state asks for."""
-        return self._at(self.row)
-
-    def _at(self, row: int) -> Stance:
-        # In closed loop a foot may be off its place by a little: it is shown where it was.
-        return self.stance.at(self.playback.configurations[row], check=False)
-
-    def view(self, state: State, revision: int = 0, last: View | None = None) -> View:
-        """What the row looks like; where no criterion can be told, the robot without them."""
-        row = self.row
-        here = self._at(row)
-        try:
-            return replace(self._view(here, state, revision), row=row)
-        except CopsenseError as error:
-            parts = posture_parts(here)
-            return View(state, revision, criteria=(), reason=str(error), row=row, **parts)
-
-    def measured(self, row: int) -> Float[np.ndarray, "k 3"] | None:
-        """Measured centres of pressure of a row in the world [m]; None where there are none."""
-        if self.playback.measured is None:
-            return None
-        found = []
-        for cop, place in zip(self.playback.measured[row], self._at(row).placements, strict=True):
-            if np.all(np.isfinite(cop)):
-                found.append(place.act(np.array([*cop, 0.0])))
-        return np.array(found).reshape(-1, 3)
-
-    def add_curve(self, view: View, stale: Stale = lambda: False) -> View:
-        """The view with the least margins over the rows."""
-        if "curve" not in view.state.overlays:
-            return view
-        key = replace(view.state, coordinates={}, overlays=frozenset())
-        if key not in self._along:
-            rows = np.unique(np.linspace(0, len(self.playback) - 1, _CURVE_POINTS).astype(int))
-            names, limits = self.criteria_of(view.state), self.limits_of(view.state)
-            margins = []
-            for row in rows:
-                if stale():
-                    return view
-                here = self._at(int(row))
-                margins.append([least_margin(here, c, limits) for c in names.values()])
-            self._along = {key: (self.playback.values[rows], np.array(margins).T)}
-        values, found = self._along[key]
-        order = np.argsort(values)
-        return replace(view, curve_y=values[order], curve_margin=found[:, order])
-
-    def code(self, state: State) -> tuple[str, str]:
-        """What of the row can be said: no command, but Python."""
-        kind = (
-            "from copsense.simulation import Recording as File"
-            if self.playback.axis == "time"
-            else "from copsense.sweeps import Sweep as File"
-        )
-        value, number = self.playback.values[self.row], int(self.playback.rows[self.row])
-        lines = (
-            f"{kind}\n\n# {self.playback.axis} = {value:.6g} {self.playback.unit}\n"
-            f"q = File.load({str(self.playback.path)!r})['configuration'].values[{number}]"
-        )
-        python = replace(state, coordinates={}, held=False).to_python(lines, ".at(q)")
-        return f"# row {number} of {self.playback.path}", python
-
-
-def frame_rows(playback: Playback, rate: float = 25.0) -> tuple[list[int], float]:
-    """Rows to show one after the other, and the seconds between them.
-
-    A recording goes at the speed it happened, a sweep once in five seconds.
+def load_run(
+    path: str | Path,
+    stance: Stance,
+    map_file: str | Path | None = None,
+    advance: Callable[[int], object] = lambda _: None,
+) -> PostureRun:
+    """Read a file of `copsense balance --output` or `copsense sweep --output`, or a robot's log.
 
     Args:
-        playback: the postures.
+        path: netCDF of copsense's; anything else is read as a log (`copsense.logs.read_log`), its
+            base where the feet put it.
+        stance: the robot and the contacts it was made of, or on which the log was recorded.
+        map_file: which signal of a log is what; default what its layout says.
+        advance: called with the bytes of a log that are read, for a progress bar.
+
+    Raises:
+        InvalidInputError: no such file, something else, or of another robot.
+        MissingExtraError: a package that its format takes is not installed.
+    """
+    mapped = "" if map_file is None else f", {str(map_file)!r}"
+    if Path(path).suffix == RECORDED:
+        if map_file is not None:
+            raise InvalidInputError(
+                f"a mapping is of a robot's log, and {path} is a file of copsense's. Leave it out."
+            )
+        found = _load_recorded(path, stance)
+    else:
+        contacts = stance.contact_names
+        log = read_log(path, map_file, robot=stance.robot, contacts=contacts, advance=advance)
+        found = align_log(log, stance).run(log)
+    return replace(
+        found,
+        source=str(path),
+        python="from copsense.explore.playback import load_run\n\n"
+        f"run = load_run({str(path)!r}, {{stance}}{mapped})",
+    )
+
+
+def _load_recorded(path: str | Path, stance: Stance) -> PostureRun:
+    require("xarray", "playing a recording")
+    try:
+        recording = Recording.load(path)
+    except InvalidInputError as error:
+        try:
+            sweep = Sweep.load(path)
+        except InvalidInputError:
+            raise error from None
+        return sweep_run(sweep, stance)
+    return recording_run(recording, stance)
+
+
+def recording_run(recording: Recording, stance: Stance) -> PostureRun:
+    """The postures of a recording in time, with the motion that their inertia is of.
+
+    Configurations are smoothed over 50 ms for velocities and accelerations, which are left out
+    after the first contact has tipped: the contacts then no longer hold.
+
+    Args:
+        recording: of a closed loop.
+        stance: what it was made of.
+
+    Raises:
+        InvalidInputError: it is of another robot, or holds no posture.
+    """
+    _check_digest(recording, stance, "the recording")
+    times, q = np.asarray(recording["time"].values, float), recording["configuration"].values
+    whole = _known(q, "the recording")
+    tip = math.inf if recording.tip is None else recording.tip.time
+    return PostureRun(
+        stance,
+        "time",
+        "s",
+        times[whole],
+        q[whole],
+        np.flatnonzero(whole),
+        recording["cop"].values[whole],
+        *_motion(stance, times[whole], np.array(q[whole]), tip),
+        "the recording",
+    )
+
+
+def sweep_run(sweep: Sweep, stance: Stance) -> PostureRun:
+    """The postures of a sweep along its coordinate.
+
+    Args:
+        sweep: the sweep.
+        stance: what it was made of.
+
+    Raises:
+        InvalidInputError: it is of another robot, or holds no posture.
+    """
+    _check_digest(sweep, stance, "the sweep")
+    axis = str(sweep.attrs["coordinate"])
+    values, q = np.asarray(sweep[axis].values, float), sweep["configuration"].values
+    whole, unit = _known(q, "the sweep"), str(sweep[axis].attrs.get("units", ""))
+    rows = np.flatnonzero(whole)
+    return PostureRun(stance, axis, unit, values[whole], q[whole], rows, source="the sweep")
+
+
+def run_seconds(run: PostureRun) -> float:
+    """How long a run takes to play [s]: in time as it happened, otherwise five seconds."""
+    return float(abs(run.values[-1] - run.values[0])) if run.axis == "time" else SWEEP_SECONDS
+
+
+def frame_rows(run: PostureRun, rate: float = 25.0) -> tuple[list[int], float]:
+    """Rows to show one after the other, and the seconds between them.
+
+    Args:
+        run: the postures.
         rate: frames a second.
     """
-    if playback.axis == "time":
-        seconds = float(playback.values[-1] - playback.values[0])
-    else:
-        seconds = SWEEP_SECONDS
-    count = max(2, min(math.ceil(seconds * rate) + 1, 2000))
-    wanted = np.linspace(playback.values[0], playback.values[-1], count)
-    rows = [int(np.argmin(np.abs(playback.values - value))) for value in wanted]
+    seconds = run_seconds(run)
+    count = max(2, min(math.ceil(seconds * rate) + 1, _MOST))
+    wanted = np.linspace(run.values[0], run.values[-1], count)
+    rows = [int(np.argmin(np.abs(run.values - value))) for value in wanted]
     return rows, max(seconds, 1e-3) / (count - 1)
+
+
+def _check_digest(made: Recording | Sweep, stance: Stance, what: str) -> None:
+    if made.attrs.get("model_digest") != model_digest(stance):
+        raise InvalidInputError(
+            f"{what} is of another stance: its robot is {made.attrs.get('robot')!r} "
+            f"on {', '.join(str(name) for name in made['contact'].values)}, or one of them "
+            "has changed since. Explore the stance that it was made of, with the same options."
+        )
+
+
+def _known(q: np.ndarray, what: str) -> np.ndarray:
+    """Rows that hold a posture."""
+    whole = np.asarray(np.isfinite(q).all(axis=1))
+    if not whole.any():
+        raise InvalidInputError(f"{what} holds no posture. Play another file.")
+    return whole
+
+
+def _motion(
+    stance: Stance, times: np.ndarray, q: np.ndarray, tip: float
+) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Velocities and accelerations, NaN from the tip on; None of what is too short to smooth."""
+    if len(times) < 2 or stance.robot.base_nv != 6:
+        return None, None
+    step = float(times[-1] - times[0]) / (len(times) - 1)
+    window = smoothing_window(_FREQUENCY, step)
+    late = times > tip - window * step / 2
+    if len(times) < window + 2 or late.all():
+        return None, None
+    base = q[:, :7].copy()
+
+    def stand(rows: np.ndarray, samples: int, every: int) -> np.ndarray:
+        return put_on_base(stance.robot, rows, base[::every], "", samples)
+
+    known = np.ones(len(times), dtype=bool)
+    motion = smooth_motion(stance.robot, q, window, step, stand, known)
+    v, a = motion.velocities.copy(), motion.accelerations.copy()
+    v[late], a[late] = np.nan, np.nan
+    return v, a

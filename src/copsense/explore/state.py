@@ -119,7 +119,7 @@ class State:
             parts += ["--limits", limits_text(self.limits)]
         return shlex.join(parts)
 
-    def to_python(self, before: str = "", moved: str = "") -> str:
+    def to_python(self, before: str = "", posture: str = "{stance}") -> str:
         """The lines of Python that print the numbers of this state.
 
         A stance that takes more than a name to say is read from a file; a comment says which
@@ -127,7 +127,7 @@ class State:
 
         Args:
             before: lines of its own to put before the analysis.
-            moved: what follows the stance there, such as ``.at(q)``.
+            posture: what is analysed. In both ``{stance}`` stands for the stance.
         """
         lines, words = ["import copsense"], self.words
         if len(words) == 1:
@@ -149,7 +149,7 @@ class State:
             criteria = f"[{each}]"
         if not isinstance(self.limits, str):
             limits = "None" if self.limits is None else _limits_code(self.limits)
-        arguments = [f"{stance}{moved}", criteria, limits]
+        arguments = [posture.replace("{stance}", stance), criteria, limits]
         if self.held and self.coordinates:
             arguments.append(f"at={self.at!r}")
         elif self.coordinates:
@@ -158,7 +158,7 @@ class State:
             if self.joints:
                 arguments.append(f"joints={self.joints!r}")
         inside = "".join(f"    {each},\n" for each in arguments)
-        lines += [before] * bool(before)
+        lines += [before.replace("{stance}", stance)] * bool(before)
         return "\n".join([*lines, f"analysis = copsense.analyse(\n{inside})", "print(analysis)"])
 
     def to_dict(self) -> dict[str, Any]:

@@ -42,6 +42,9 @@ class CriterionView(ShortRepr):
         effort: the torques' sizes as shares of the model's effort limits; NaN where it gives none.
         active: limits that hold with equality; empty without limits.
         nearest: the limit with the smallest margin of its unit, as words; empty without limits.
+        moving_cop: centres of pressure with the inertia of the posture's motion, contact axes [m];
+            None where no motion is played.
+        moving_cop_world: the same in the world [m].
     """
 
     name: str
@@ -59,10 +62,13 @@ class CriterionView(ShortRepr):
     effort: Float[np.ndarray, " n"]
     active: tuple[str, ...] = ()
     nearest: tuple[str, ...] = ()
+    moving_cop: Float[np.ndarray, "nc 2"] | None = None
+    moving_cop_world: Float[np.ndarray, "nc 3"] | None = None
 
     def __post_init__(self) -> None:
         """Own the arrays."""
-        freeze(self, *(f for f in self.__dataclass_fields__ if f not in _WORDS))
+        arrays = (f for f in self.__dataclass_fields__ if f not in _WORDS)
+        freeze(self, *(f for f in arrays if getattr(self, f) is not None))
 
 
 _WORDS = ("name", "margin_side", "active", "nearest")
@@ -109,7 +115,9 @@ class View(ShortRepr):
         regions: of the CoM; None until they are known.
         binding: what is met first on the way to either side within limits, a line each; None until
             it is known.
-        row: of a playback; None where the posture is asked for.
+        row: of a run that is played; None where the posture is asked for.
+        measured: centres of pressure in the world (nc, 3) [m], NaN where a contact carries nothing;
+            None where nothing was measured.
     """
 
     state: State
@@ -131,11 +139,12 @@ class View(ShortRepr):
     regions: tuple[RegionView, ...] | None = None
     binding: tuple[str, ...] | None = None
     row: int | None = None
+    measured: Float[np.ndarray, "nc 3"] | None = None
 
     def __post_init__(self) -> None:
         """Own the arrays."""
         arrays = ("q", "com", "poses", "bones", "placements", "soles", "curve_y", "curve_margin")
-        freeze(self, *arrays)
+        freeze(self, *arrays, *(("measured",) if self.measured is not None else ()))
 
     def __getitem__(self, name: str) -> CriterionView:
         """What the criterion of that name says."""
@@ -164,6 +173,25 @@ class View(ShortRepr):
             for c in self.criteria
             for k, contact in enumerate(self.contacts)
         ]
+
+    @property
+    def motion_lines(self) -> tuple[str, ...]:
+        """Where centres of pressure are in motion and as measured, a line each; world axes."""
+        found = [
+            (f"{c.name}, in motion", c.moving_cop_world)
+            for c in self.criteria
+            if c.moving_cop_world is not None
+        ]
+        if self.measured is not None:
+            found.append(("measured", self.measured))
+        return tuple(
+            f"{what}: CoP x, y in the world "
+            + "; ".join(
+                f"{name} {1e3 * x:+.1f}, {1e3 * y:+.1f} mm" if np.isfinite(x) else f"{name} none"
+                for name, (x, y, _) in zip(self.contacts, places, strict=True)
+            )
+            for what, places in found
+        )
 
     @property
     def _span(self) -> float:
@@ -210,6 +238,13 @@ def poses_of(places: list[pin.SE3]) -> Float[np.ndarray, "j 7"]:
     return found[:, [0, 1, 2, 6, 3, 4, 5]]
 
 
+def cops_in_world(stance: Stance, cops: Float[np.ndarray, "nc 2"]) -> Float[np.ndarray, "nc 3"]:
+    """Centres of pressure in contact axes [m] as points of the world."""
+    flat = np.column_stack([cops, np.zeros(len(cops))])
+    places = zip(stance.placements, flat, strict=True)
+    return np.array([p.translation + p.rotation @ cop for p, cop in places]).reshape(-1, 3)
+
+
 def posture_parts(stance: Stance) -> dict[str, Any]:
     """The fields of a view that are the posture's alone."""
     model = stance.robot.model
@@ -237,9 +272,6 @@ def criterion_view(name: str, found: CopSensitivity, limits: Limits | None) -> C
     """What one criterion says, from its sensitivity."""
     equilibrium = found.equilibrium
     stance = equilibrium.stance
-    origins = np.array([place.translation for place in stance.placements])
-    flat = np.column_stack([found.cop, np.zeros(len(found.cop))])
-    turned = [p.rotation @ c for p, c in zip(stance.placements, flat, strict=True)]
     edges = [
         None if c.sole is None else c.sole.margin(cop)
         for c, cop in zip(stance.contacts, found.cop, strict=True)
@@ -255,7 +287,7 @@ def criterion_view(name: str, found: CopSensitivity, limits: Limits | None) -> C
         name,
         equilibrium.wrenches,
         found.cop,
-        origins + np.array(turned),
+        cops_in_world(stance, found.cop),
         equilibrium.world_wrenches[:, :3],
         equilibrium.wrenches[:, 2] / stance.robot.weight,
         np.array([math.inf if e is None else e.distance for e in edges]),

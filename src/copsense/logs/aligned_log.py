@@ -36,7 +36,9 @@ from copsense.logs.log_motion import (
     smoothing_window,
     stand_on_feet,
 )
+from copsense.logs.log_statics import loaded_cops
 from copsense.logs.sway_fit import LEAST, STILL, find_sway
+from copsense.posture_run import PostureRun
 from copsense.robot import Robot
 from copsense.robots import PRESETS, load_robot, load_stance
 from copsense.stance import Stance
@@ -75,6 +77,29 @@ class AlignedLog(ShortRepr):
     def __post_init__(self) -> None:
         """Own the arrays."""
         freeze(self, "rows", "wrenches", "torques")
+
+    def run(self, log: Log) -> PostureRun:
+        """The postures of the rows that are used, with their motion and what was measured.
+
+        Args:
+            log: the one that was aligned.
+        """
+        rows, motion = self.rows, self.motion
+        # The feet are where the joints put them, millimetres off one plane.
+        middle = motion.configurations[rows[len(rows) // 2]]
+        cops = loaded_cops(self.wrenches[rows])
+        return PostureRun(
+            Stance(self.robot, middle, self.contacts, check=False),
+            "time",
+            "s",
+            log.times[rows],
+            motion.configurations[rows],
+            rows,
+            cops if np.isfinite(cops).any() else None,
+            motion.velocities[rows],
+            motion.accelerations[rows],
+            log.source,
+        )
 
 
 def align_log(

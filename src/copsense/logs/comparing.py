@@ -75,7 +75,8 @@ def compare_log(
     findings, notes, wrenches = [*aligned.findings], [*aligned.notes], aligned.wrenches
     statics = log_statics(model, feet, chosen, motion, rows, advance)
     com = com_rows(model, motion.configurations[rows])
-    placed = Stance(model, motion.configurations[rows[len(rows) // 2]], tuple(feet), check=False)
+    run = aligned.run(log)
+    placed = run.stance
     travel, distance = com_travel(placed, com)
     measured, times, window = wrenches[rows], log.times[rows], motion.window
     late = times >= skip
@@ -115,6 +116,7 @@ def compare_log(
         encoders,
         tuple(findings),
         tuple(notes),
+        run,
     )
 
 

@@ -17,6 +17,7 @@ from copsense.logs.finding import Finding
 from copsense.logs.log import Log
 from copsense.logs.log_statics import LogStatics, load_shares, loaded_cops
 from copsense.logs.sway_fit import SlopeEstimate, Sway
+from copsense.posture_run import PostureRun
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,6 +54,7 @@ class LogComparison:
             [rad]; 0 where it was left out.
         findings: what is missing or does not fit.
         notes: how it was done, a sentence each.
+        run: the postures that are compared, with their motion.
     """
 
     log: Log
@@ -75,6 +77,7 @@ class LogComparison:
     encoders: float
     findings: tuple[Finding, ...]
     notes: tuple[str, ...]
+    run: PostureRun
 
     def __post_init__(self) -> None:
         """Own the arrays."""
