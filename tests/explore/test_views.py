@@ -43,6 +43,12 @@ def random_states(model, count):
         for c in moved[: min(1 + number % 4, free)]:
             end = c.low if rng.random() < 0.5 else c.high
             asked[c.name] = Setting(c.home + 0.1 * rng.random() * (end - c.home), c.unit)
+        loads = ()
+        if number % 4 == 1:  # a push and what it turns, at a point of the base
+            force = (0.0, *rng.uniform(-10, 10, 2).tolist())
+            moment = (float(rng.uniform(-1, 1)), 0.0, 0.0) if number % 8 == 1 else (0.0, 0.0, 0.0)
+            loads = (copsense.Load(model.stance.robot.base_frame, force, moment, (0.0, 0.0, 0.1)),)
+        limits = replace(LIMITS, normal_force=2.5, cop_margin=0.003) if number == 3 else LIMITS
         weights = {name: float(rng.uniform(0.3, 3)) for name in ("hip", "knee")}
         named = all(any(w in t.lower() for t in model.stance.robot.torque_names) for w in weights)
         criteria = [(), ("minimum-wrench", weights_text(weights) if named else "minimum-torque")]
@@ -52,7 +58,8 @@ def random_states(model, count):
             held,
             criteria[number % 3 == 2],
             float(rng.uniform(0.1, 2.0)) if number % 3 == 2 else 1.0,
-            LIMITS if number % 5 == 3 else "own",
+            limits if number % 5 == 3 else "own",
+            loads=loads,
         )
 
 
@@ -73,6 +80,7 @@ def test_a_view_has_the_numbers_of_its_command(robot, stance_of, monkeypatch):
         shown += 1
         said = answer.json
         np.testing.assert_allclose(view.com, said["com"], rtol=0, atol=1e-9)
+        assert len(view.load_points) == len(state.loads)
         assert [found.name for found in view.criteria] == list(said["criteria"])
         for found in view.criteria:
             row = said["criteria"][found.name]
@@ -109,6 +117,7 @@ def test_python_and_the_command_say_one_thing(model, tmp_path, monkeypatch):
         {"com_y": Setting(0.0123456789, "m"), "l_elbow": Setting(0.7, "rad")},
         criteria=("minimum-torque", "weighted-torque:hip=2.5"),
         limits=copsense.Limits(friction=0.4, normal_force=None),
+        loads=(copsense.Load("l_hand", (0.0, 5.0, -20.0), fixed_to="body"),),
     )
     lines = state.to_python().replace("print(analysis)", "")
     here = {}
@@ -117,6 +126,7 @@ def test_python_and_the_command_say_one_thing(model, tmp_path, monkeypatch):
     for name, found in here["analysis"].sensitivities.items():
         np.testing.assert_allclose(found.cop, view[name].cop, rtol=0, atol=1e-12)
         assert found.equilibrium.limits == state.limits
+        assert found.equilibrium.stance.loads == state.loads
     held = State(("icub",), {"yaw": Setting(3.1, "rad"), "com_z": Setting(0.5, "m")}, held=True)
     exec(held.to_python().replace("print(analysis)", ""), here)
     np.testing.assert_allclose(here["analysis"].stance.q, model.view(held).q, atol=1e-9)
@@ -138,6 +148,10 @@ def test_a_stance_of_many_words_goes_through_a_file(tmp_path, monkeypatch):
 names = some.sampled_from(["com_x", "l_knee", "a joint's name", "l_sole:yaw"])
 numbers = some.floats(-1e3, 1e3)
 limits = some.sampled_from(["own", None, copsense.Limits(), copsense.Limits(friction=None)])
+loads = some.sampled_from([
+    copsense.Load("a", (0.1, -2.0, 1e3)),
+    copsense.Load("b c", (0.0, 1.5, 0.0), (0.0, 0.0, 7.0), (0.1, 0.0, 0.2), "body"),
+])  # fmt: skip
 
 
 @settings(max_examples=25, deadline=None)
@@ -147,9 +161,11 @@ limits = some.sampled_from(["own", None, copsense.Limits(), copsense.Limits(fric
     some.lists(some.sampled_from(["minimum-torque", "stiffness:hip=2"]), unique=True),
     some.floats(1e-3, 1e3),
     limits,
+    some.lists(loads, max_size=2),
 )
-def test_a_state_survives_json(coordinates, held, criteria, length, within):
-    state = State(("icub", "--sole", "a b"), coordinates, held, tuple(criteria), length, within)
+def test_a_state_survives_json(coordinates, held, criteria, length, within, forces):
+    words, loads = ("icub", "--sole", "a b"), tuple(forces)
+    state = State(words, coordinates, held, tuple(criteria), length, within, loads=loads)
     again = State.from_json(state.to_json())
     assert again == state
     assert hash(again) == hash(state)
@@ -166,6 +182,7 @@ def test_a_state_survives_json(coordinates, held, criteria, length, within):
         ('{"coordinates": {"com_y": [3, "deg"]}}', UnknownNameError, "deg"),
         ('{"criteria": "minimum-torque"}', InvalidInputError, "not a list"),
         ('{"length": -1}', InvalidInputError, "positive"),
+        ('{"loads": [{"frames": "a"}]}', InvalidInputError, "to_dict"),
     ],
 )
 def test_what_is_no_state_is_rejected(text, error, words):

@@ -179,9 +179,10 @@ def test_what_the_command_asked_for_stays_to_the_last_digit(stance_of):
     with Explorer(Model(stance_of("four_bar")), state, meshes=False, light=True) as explorer:
         panel = explorer._panel
         assert panel.read() == state
-        panel._torque.value = True  # nothing else of the limits changes
+        torque, *_ = panel._judging._choices["torque"]
+        torque.value = "the model's"  # nothing else of the limits changes
         assert panel.read().limits == replace(state.limits, torque="model")
-        panel._length.value = -1.0
+        panel._judging._length.value = -1.0
         assert panel.read() == replace(
             state, length=0.1, limits=replace(state.limits, torque="model")
         )

@@ -5,7 +5,8 @@ a `View`, plain data with the numbers of `copsense.analyse`. Neither knows a win
 explore`` shows them in the browser (`copsense.explore.server`, the extra ``explore``).
 """
 
-from copsense.explore.model import Coordinate, Model
+from copsense.explore.model import Model
+from copsense.explore.movable import Coordinate
 from copsense.explore.state import Setting, State
 from copsense.explore.view import CriterionView, RegionView, View
 

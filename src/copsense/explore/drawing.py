@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -14,6 +14,7 @@ from copsense.explore.view import CriterionView, View
 Colour = tuple[int, int, int]
 
 BONE: Colour = (150, 160, 172)
+LOADED: Colour = (200, 60, 120)
 
 
 class Inks(NamedTuple):
@@ -35,6 +36,10 @@ _COLD, _MILD, _HOT = np.array([(196, 204, 212), (240, 200, 80), (200, 30, 30)], 
 OPACITY = 0.6  # of meshes at first: what counts is inside the feet
 # Hundredths of the robot's height: what was measured is behind what should be there.
 _FORMS: Mapping[str, tuple[float, float]] = {"square": (1.5, 3.0), "diamond": (3.0, 2.0)}
+# Which labels are shown: a contact's with its load, a joint's with its torque.
+NO_LABELS, CONTACTS, LARGEST, JOINTS = "none", "contacts", "largest torques", "all torques"
+LABELS = (NO_LABELS, CONTACTS, LARGEST, JOINTS)
+_LARGEST = 6  # torques
 _LIFT = 0.002  # m: outlines over the ground, so that they do not flicker
 
 
@@ -49,6 +54,9 @@ class Shown:
         regions: outlines of the regions of the CoM.
         axes: axes of the contact frames.
         opacity: of the meshes.
+        criterion: whose numbers the labels have.
+        labels: which of them, one of `LABELS`.
+        pinned: joints whose labels are shown whatever `labels` says.
     """
 
     robot: Literal["meshes", "stick figure", "hidden"] = "meshes"
@@ -57,6 +65,9 @@ class Shown:
     regions: bool = True
     axes: bool = False
     opacity: float = 1.0
+    criterion: str = ""
+    labels: str = NO_LABELS
+    pinned: frozenset[str] = frozenset()
 
 
 def criterion_colours(names: Sequence[str]) -> dict[str, Colour]:
@@ -99,7 +110,14 @@ class Scene:
     height: float
 
     def __init__(
-        self, server: Any, view: View, shape: Shape, *, light: bool = False, dark: bool = False
+        self,
+        server: Any,
+        view: View,
+        shape: Shape,
+        *,
+        light: bool = False,
+        dark: bool = False,
+        clicked: Callable[[str], object] | None = None,
     ) -> None:
         """Put them there.
 
@@ -109,9 +127,10 @@ class Scene:
             shape: the robot's meshes.
             light: leave out what slow machines cannot draw.
             dark: for a dark page.
+            clicked: called with the joint of a link that was clicked.
         """
         self._inks = ON_DARK if dark else ON_LIGHT
-        self._scene, self._shape = server.scene, shape
+        self._scene, self._shape, self._clicked = server.scene, shape, clicked
         self.height = max(float(np.ptp(view.bones[..., 2])), 0.2)
         self._unit = self.height / 100.0
         self._light(light)
@@ -130,6 +149,8 @@ class Scene:
         self._arrows: dict[str, Any] = {}
         self._outlines: dict[str, Any] = {}
         self._clouds: dict[str, Any] = {}
+        self._labels: dict[str, Any] = {}
+        self._loads: Any = None
 
     def show(self, view: View, shown: Shown) -> None:
         """Draw a view; call it within ``server.atomic()``."""
@@ -145,6 +166,8 @@ class Scene:
         self._show_criteria(view, shown, colours)
         self._show_regions(view, shown, colours)
         self._show_motion(view, colours)
+        self._show_loads(view)
+        self._show_labels(view, shown)
 
     def _show_motion(self, view: View, colours: Mapping[str, Colour]) -> None:
         """Centres of pressure in motion as squares, and measured ones as diamonds."""
@@ -200,6 +223,10 @@ class Scene:
                 cast_shadow=False,
                 receive_shadow=False,
             )
+            if self._clicked is not None:
+                self._meshes[mesh.joint].on_click(
+                    lambda _, joint=view.joints[mesh.joint], clicked=self._clicked: clicked(joint)
+                )
         self._bones = self._scene.add_line_segments(
             "/bones",
             np.asarray(view.bones, np.float32),
@@ -274,6 +301,37 @@ class Scene:
         for name, handle in self._outlines.items():
             _assign(handle, visible=shown.regions and name in found)
 
+    def _show_loads(self, view: View) -> None:
+        if self._loads is None and len(view.load_points):
+            self._loads = self._scene.add_arrows(
+                "/loads",
+                np.zeros((1, 2, 3), np.float32),
+                LOADED,
+                shaft_radius=0.7 * self._unit,
+                head_radius=1.6 * self._unit,
+                head_length=3.0 * self._unit,
+            )
+        if self._loads is None:
+            return
+        _assign(self._loads, visible=len(view.load_points) > 0)
+        if len(view.load_points):
+            # The arrow points at where it pushes; the largest is a fifth of the robot long.
+            size = max(float(np.linalg.norm(view.load_forces, axis=1).max()), 1e-9)
+            tails = view.load_points - view.load_forces * (0.2 * self.height / size)
+            self._loads.points = np.stack([tails, view.load_points], axis=1).astype(np.float32)
+
+    def _show_labels(self, view: View, shown: Shown) -> None:
+        texts = _labels(view, shown)
+        for name, (text, place) in texts.items():
+            if name not in self._labels:
+                self._labels[name] = self._scene.add_label(
+                    f"/label/{len(self._labels)}", text, font_screen_scale=0.8
+                )
+            _assign(self._labels[name], text=text, visible=True)
+            self._labels[name].position = place
+        for name in self._labels.keys() - texts.keys():
+            _assign(self._labels[name], visible=False)
+
     def _lines(self, name: str, width: float, colour: Colour) -> Any:
         return self._scene.add_line_segments(
             name, np.zeros((1, 2, 3), np.float32), colour, thickness=width, thickness_units="screen"
@@ -298,6 +356,30 @@ def _efforts(view: View, criterion: str) -> dict[str, float]:
     largest = max(float(np.abs(found.torques).max(initial=0.0)), 1e-9)
     shares = np.where(np.isfinite(found.effort), found.effort, np.abs(found.torques) / largest)
     return dict(zip(view.torque_names, shares.tolist(), strict=True))
+
+
+def _labels(view: View, shown: Shown) -> dict[str, tuple[str, np.ndarray]]:
+    """What each label says, and where it is in the world."""
+    found = next((each for each in view.criteria if each.name == shown.criterion), None)
+    if found is None:
+        return {}
+    texts = {}
+    if shown.labels == CONTACTS:
+        for k, name in enumerate(view.contacts):
+            text = f"{name}: {100 * found.load_share[k]:.1f} %"
+            texts[f"contact {name}"] = text, view.placements[k, :3]
+    wanted = set(shown.pinned)
+    order = np.argsort(-np.abs(found.torques))
+    if shown.labels in (LARGEST, JOINTS):
+        count = _LARGEST if shown.labels == LARGEST else len(order)
+        wanted |= {view.torque_names[i] for i in order[:count]}
+    for i, name in enumerate(view.torque_names):
+        joint = name if name in view.joints else name.partition("[")[0]
+        if joint in view.joints and wanted & {name, joint}:
+            effort = "" if np.isnan(found.effort[i]) else f" ({100 * found.effort[i]:.0f} %)"
+            text = f"{name}: {found.torques[i]:.1f} {view.torque_units[i]}{effort}"
+            texts[f"joint {name}"] = text, view.poses[view.joints.index(joint), :3]
+    return texts
 
 
 def _closed(outlines: Sequence[np.ndarray], lift: float) -> np.ndarray:

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from copsense.design import Objective
 from copsense.errors import CopsenseError
+from copsense.explore.best_weights import best_weights
 from copsense.explore.drawing import Scene, look_at, place_camera
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
@@ -68,7 +70,7 @@ class Explorer:
             MissingExtraError: viser is not installed.
         """
         begun = time.monotonic()
-        self.model, self._status, self._saved = model, "", ""
+        self.model, self._status, self._saved, self._problem = model, "", "", ""
         self._lock = threading.Lock()
         state = state or replace(model.start, overlays=frozenset({"curve"}))
         self._shape, problem = _shape_of(model, meshes)
@@ -103,11 +105,18 @@ class Explorer:
                 "front": self._from_front,
                 "save stance": self._save,
             },
+            weighings={
+                "go farthest": lambda: self._weigh("travel"),
+                "move least": lambda: self._weigh("gain"),
+            },
             run=model.run if isinstance(model, PlayedModel) else None,
         )
-        self._scene = Scene(viser, first, self._shape, light=light, dark=dark)
+        self._scene = Scene(
+            viser, first, self._shape, light=light, dark=dark, clicked=self._panel.pin
+        )
         self._base_status = "; ".join([*problem, *self._shape.notes[:1]])
         self._compiling: threading.Thread | None = None
+        self._weighing = threading.Lock()
         place_camera(viser, first)
         self._publish(first)
         self._limited = threadpool_limits(1)  # small matrices: more threads only cost
@@ -145,7 +154,12 @@ class Explorer:
     def _changed(self) -> None:
         # Callbacks run in many threads: whoever reads last, reads the newest.
         with self._lock:
-            state = self._panel.read()
+            try:
+                state, self._problem = self._panel.read(), ""
+            except CopsenseError as error:  # a number that means nothing
+                self._problem = str(error)
+                self._worker.again()
+                return
             if isinstance(self.model, PlayedModel):
                 self.model.row = self._panel.row
             if state.held and not self.model.compiled and self._compiling is None:
@@ -156,10 +170,13 @@ class Explorer:
     def _publish(self, view: View) -> None:
         viser = self.server.viser
         status = "; ".join(
-            filter(None, (self._status, self._base_status, self._worker.error[-300:]))
+            filter(
+                None,
+                (self._problem, self._status, self._base_status, self._worker.error[-300:]),
+            )
         )
         with viser.atomic():
-            self._scene.show(view, self._panel.shown())
+            self._scene.show(view, self._panel.shown(view))
             self._panel.write(view, status, self._saved)
         viser.flush()
 
@@ -208,6 +225,24 @@ class Explorer:
         except CopsenseError as error:
             self._status = f"the search for postures is not compiled: {error}"
         self._worker.again()
+
+    def _weigh(self, objective: Objective) -> None:
+        """Look for the best weights, beside the window, and set the sliders to them."""
+        if not self._weighing.acquire(blocking=False):
+            return  # one search at a time
+        try:
+            self._saved = "looking for the best weights ..."
+            self._worker.again()
+            with self._lock:
+                state = self._panel.read()
+            keys = self._panel.weight_keys
+            weights, self._saved = best_weights(self.model, state, keys, objective)
+            self._panel.set_weights(weights)
+        except CopsenseError as error:
+            self._saved = f"no best weights: {error}"
+            self._worker.again()
+        finally:
+            self._weighing.release()
 
     def _reset(self) -> None:
         self._saved = ""

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from copsense.analysis.asked import asked_posture, determined_criteria, placed_stance
 from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
-from copsense.batch import PostureChart, coordinate_names
+from copsense.batch import PostureChart
 from copsense.batch.postures.chart import unreachable
 from copsense.content import FrozenMapping
 from copsense.cop import contact_cops
@@ -22,6 +20,7 @@ from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.criterion_text import criterion_from_text
 from copsense.design import joint_groups
 from copsense.errors import CopsenseError
+from copsense.explore.movable import Coordinate, movable_coordinates
 from copsense.explore.state import State
 from copsense.explore.view import (
     RegionView,
@@ -30,6 +29,7 @@ from copsense.explore.view import (
     posture_parts,
 )
 from copsense.limits import Limits
+from copsense.loads import Load
 from copsense.path import COM_COORDINATES, LateralPath
 from copsense.posture import solve_posture
 from copsense.regions import com_regions
@@ -39,33 +39,10 @@ from copsense.statics import named_criteria, solve_equilibrium
 
 _CURVE_STEP, _CURVE_REACH = 0.005, 0.12  # m, between the postures of the curve and to either side
 _REGION_TOLERANCE = 1e-3  # m
-_WRONG_SIDE = 2.5  # rad of yaw from which a base looks backwards
+_KEPT = 64  # charts
 
 Stale = Callable[[], bool]
 Stage = Callable[[View, Stale], View]
-
-
-class Coordinate(NamedTuple):
-    """What a slider moves.
-
-    Attributes:
-        name: as `PostureChart` has it.
-        unit: of its value.
-        home: the stance's own value [m, rad].
-        low: from where on it can be asked for.
-        high: up to where.
-        kind: what it is of.
-        sign: -1 where it is shown with the sign reversed, as roll and pitch of a base that looks
-            backwards.
-    """
-
-    name: str
-    unit: Literal["m", "rad"]
-    home: float
-    low: float
-    high: float
-    kind: Literal["com", "trunk", "joint", "foot"]
-    sign: int = 1
 
 
 class Model:
@@ -121,12 +98,13 @@ class Model:
         if limits is not None:
             check_type(limits, Limits, "limits", "Give copsense.Limits(...).")
         self.limits = limits
-        self.coordinates = FrozenMapping({c.name: c for c in _coordinates(stance)})
+        self.coordinates = FrozenMapping({c.name: c for c in movable_coordinates(stance)})
         self.groups = FrozenMapping(joint_groups(stance))
         self.compiled = PostureChart(stance, ("com_y",)).compiled
-        self._charts: dict[tuple[tuple[str, ...], bool], PostureChart] = {}
+        self._charts: dict[tuple[tuple[str, ...], tuple[Load, ...], bool], PostureChart] = {}
+        self._under = lru_cache(maxsize=4)(self._put_under)
         self._criteria = lru_cache(maxsize=32)(self._read_criteria)
-        self._curves: dict[State, tuple[np.ndarray, np.ndarray]] = {}
+        self._curves: dict[State, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def __repr__(self) -> str:
         """The robot."""
@@ -160,15 +138,27 @@ class Model:
         Raises:
             CopsenseError: there is none; the message says why.
         """
+        stance = self.loaded(state)
         if state.at and self.compiled:
-            chart = self._chart(tuple(state.at))
+            chart = self._chart(tuple(state.at), state.loads)
             found = chart.solve([list(state.at.values())])
             if not found.converged[0]:
-                raise unreachable(self.stance, state.at, str(found.reasons[0]))
-            return self.stance.at(found.configurations[0])
+                raise unreachable(stance, state.at, str(found.reasons[0]))
+            return stance.at(found.configurations[0])
         joints = {} if state.at else state.joints
         com = (None, None, None) if state.at else state.com
-        return placed_stance(self.stance, com, joints, state.at)
+        return placed_stance(stance, com, joints, state.at)
+
+    def loaded(self, state: State) -> Stance:
+        """The stance under a state's loads.
+
+        Raises:
+            CopsenseError: a load on what is not there.
+        """
+        return self._under(state.loads)
+
+    def _put_under(self, loads: tuple[Load, ...]) -> Stance:
+        return self.stance.with_loads([*self.stance.loads, *loads]) if loads else self.stance
 
     def view(self, state: State, revision: int = 0, last: View | None = None) -> View:
         """What a state looks like, all but what the `stages` add.
@@ -206,7 +196,7 @@ class Model:
         return (0.0, self.add_curve), (0.12, self.add_regions), (0.5, self.add_binding)
 
     def add_curve(self, view: View, stale: Stale = lambda: False) -> View:
-        """The view with the margins along the lateral path through it.
+        """The view with margins and load shares along the lateral path through it.
 
         The path holds what the state holds, but the CoM's y.
         """
@@ -215,25 +205,34 @@ class Model:
         asked = {n: s for n, s in view.state.coordinates.items() if n != "com_y"}
         key = replace(view.state, coordinates=asked, overlays=frozenset())
         if key not in self._curves:
-            found: dict[float, list[float]] = {}
+            found: dict[float, list[tuple[float, float]]] = {}
             names, limits = self.criteria_of(view.state), self.limits_of(view.state)
             for y, here in self._lateral(key):
                 if stale():
                     return view
-                found[y] = [least_margin(here, c, limits) for c in names.values()]
+                found[y] = [least_values(here, c, limits) for c in names.values()]
             if not found:
                 return view
             ys = np.array(sorted(found))
-            self._curves = {key: (ys, np.array([found[y] for y in ys]).T)}  # the last one is enough
-        known, margins = self._curves[key]
-        return replace(view, curve_y=known, curve_margin=margins)
+            margins, shares = np.array([found[y] for y in ys]).transpose(2, 1, 0)
+            self._curves = {key: (ys, margins, shares)}  # the last one is enough
+        known, margins, shares = self._curves[key]
+        names = self.criteria_of(view.state)
+        return replace(
+            view,
+            curve_y=known,
+            curve_criteria=tuple(names),
+            curve_margin=margins,
+            curve_share=shares,
+        )
 
     def _lateral(self, key: State) -> Iterator[tuple[float, Stance]]:
         """Postures along the lateral path of a state, from the middle outwards."""
-        middle = float(self.stance.com[1])
+        stance = self.loaded(key)
+        middle = float(stance.com[1])
         count = round(_CURVE_REACH / _CURVE_STEP)
         for side in (1, -1):
-            here = self.stance
+            here = stance
             for i in range(0 if side == 1 else 1, count + 1):
                 y = middle + side * i * _CURVE_STEP
                 try:
@@ -241,10 +240,10 @@ class Model:
                         here = self.posture(key.named("com_y", y, "m"))
                     else:
                         x, _, z = key.com
-                        if x is None and self.stance.robot.base_nv == 6:
-                            x = float(self.stance.com[0])
+                        if x is None and stance.robot.base_nv == 6:
+                            x = float(stance.com[0])
                         here = solve_posture(
-                            here, com=(x, y, z), joints=key.joints, reference=self.stance.q
+                            here, com=(x, y, z), joints=key.joints, reference=stance.q
                         ).stance
                 except CopsenseError:
                     break
@@ -254,7 +253,7 @@ class Model:
         """The view with the regions of the CoM, the joints held; without limits, of the soles."""
         if view.reason or "regions" not in view.state.overlays:
             return view
-        here = self.stance.at(view.q)
+        here = self.loaded(view.state).at(view.q)
         limits = self.limits_of(view.state) or Limits()
         chosen, _ = determined_criteria(here, self.criteria_of(view.state), None)
         criteria = [c for c in chosen.values() if isinstance(c, Criterion)]
@@ -273,7 +272,9 @@ class Model:
         limits = self.limits_of(view.state)
         if view.reason or limits is None or not limits.any:
             return view
-        here, tangent = asked_posture(self.stance.at(view.q), (None, None, None), None, None)
+        here, tangent = asked_posture(
+            self.loaded(view.state).at(view.q), (None, None, None), None, None
+        )
         chosen, _ = determined_criteria(here, self.criteria_of(view.state), limits)
         path, lines = LateralPath(here), []
         for name, criterion in chosen.items():
@@ -349,10 +350,12 @@ class Model:
         # What the stance itself is beyond, it may stay beyond.
         return bool(np.all(here.joint_limit_excess <= self.stance.joint_limit_excess + AT_LIMIT))
 
-    def _chart(self, names: tuple[str, ...]) -> PostureChart:
-        key = names, self.compiled
+    def _chart(self, names: tuple[str, ...], loads: tuple[Load, ...]) -> PostureChart:
+        key = names, loads, self.compiled
         if key not in self._charts:
-            self._charts[key] = PostureChart(self.stance, names, compiled=self.compiled)
+            if len(self._charts) > _KEPT:
+                self._charts.clear()
+            self._charts[key] = PostureChart(self._under(loads), names, compiled=self.compiled)
         return self._charts[key]
 
     def _read_criteria(self, texts: tuple[str, ...], length: float) -> dict[str, Criterion]:
@@ -364,48 +367,23 @@ class Model:
         return dict(named_criteria(found, "an explorer", policies=False))
 
 
-def least_margin(stance: Stance, criterion: Criterion, limits: Limits | None) -> float:
-    """The least margin of any contact with a sole [m]; NaN where there is none."""
+def least_values(
+    stance: Stance, criterion: Criterion, limits: Limits | None
+) -> tuple[float, float]:
+    """The least margin of any contact with a sole [m], and the least share of the weight of any.
+
+    NaN where there is none.
+    """
     try:
         chosen, _ = determined_criteria(stance, {criterion.name: criterion}, limits)
-        cops = contact_cops(solve_equilibrium(stance, chosen[criterion.name], limits))
+        equilibrium = solve_equilibrium(stance, chosen[criterion.name], limits)
+        share = float(equilibrium.wrenches[:, 2].min()) / stance.robot.weight
+        cops = contact_cops(equilibrium)
     except (CopsenseError, KeyError):
-        return np.nan
+        return np.nan, np.nan
     margins = [
         float(contact.sole.margins(cop))
         for contact, cop in zip(stance.contacts, cops, strict=True)
         if contact.sole is not None
     ]
-    return min(margins, default=np.nan)
-
-
-def _coordinates(stance: Stance) -> Iterator[Coordinate]:
-    """What can be moved, with generous ends."""
-    robot = stance.robot
-    names = coordinate_names(stance)
-    size = float(stance.com[2]) - min(float(p.translation[2]) for p in stance.placements)
-    backwards = False
-    if robot.base_nv == 6:
-        rotation = pin.Quaternion(np.array(stance.q[3:7])).matrix()
-        backwards = abs(float(pin.rpy.matrixToRpy(rotation)[2])) > _WRONG_SIDE
-    lower, upper = robot.position_limits
-    for name in names:
-        if (name == "com_x" and robot.base_nv != 6) or name.startswith("base_"):
-            continue
-        chart = PostureChart(stance, (name,), compiled=False)
-        unit, home = chart.units[0], float(chart.values[0])
-        if name in COM_COORDINATES:
-            yield Coordinate(name, unit, home, home - 0.4 * size, home + 0.4 * size, "com")
-        elif name in ("roll", "pitch", "yaw"):
-            sign = -1 if backwards and name != "yaw" else 1
-            yield Coordinate(name, unit, home, home - 0.7, home + 0.7, "trunk", sign)
-        elif ":" in name:
-            way = 0.7 if unit == "rad" else 0.4 * size
-            yield Coordinate(name, unit, home, home - way, home + way, "foot")
-        else:
-            i = robot.velocity_index(name) - robot.base_nv
-            low, high = float(lower[i]), float(upper[i])
-            way = np.pi if unit == "rad" else size
-            low = max(low, home - way) if np.isfinite(low) else home - way
-            high = min(high, home + way) if np.isfinite(high) else home + way
-            yield Coordinate(name, unit, home, min(low, home), max(high, home), "joint")
+    return min(margins, default=np.nan), share

@@ -24,6 +24,11 @@ def _text(value: object) -> str:
     return html.escape(str(value), quote=True)
 
 
+def small_html(text: str) -> str:
+    """A remark beside controls."""
+    return f'<div style="padding:0 .8em;font-size:.75em;opacity:.8">{_text(text)}</div>'
+
+
 def status_html(view: View, status: str) -> str:
     """What gives way first, or why there is no posture."""
     revision = f'<span id="copsense-revision" hidden>{view.revision}</span>'
@@ -76,10 +81,7 @@ def asked_html(state: State, model: Model) -> str:
         return f"{name} = {round(scaled, 1) + 0.0:g} {'mm' if setting.unit == 'm' else 'deg'}"
 
     asked = ", ".join(said(n, s) for n, s in state.coordinates.items())
-    return (
-        '<div style="padding:0 .8em;font-size:.75em;opacity:.8">'
-        f"asked for, in world axes: {_text(asked or 'nothing, the stance itself')}</div>"
-    )
+    return small_html(f"asked for, in world axes: {asked or 'nothing, the stance itself'}")
 
 
 def copy_html(model: Model, state: State, save: str) -> str:

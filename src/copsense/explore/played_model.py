@@ -10,7 +10,7 @@ import numpy as np
 from copsense.analysis.asked import determined_criteria
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
-from copsense.explore.model import Model, Stale, least_margin
+from copsense.explore.model import Model, Stale, least_values
 from copsense.explore.state import State
 from copsense.explore.view import CriterionView, View, cops_in_world, posture_parts
 from copsense.limits import Limits
@@ -44,7 +44,7 @@ class PlayedModel(Model):
         """Begin with the first row; the other arguments are those of `Model`."""
         super().__init__(run.stance, words, criteria=criteria, limits=limits)
         self.run, self.row = run, 0
-        self._along: dict[State, tuple[np.ndarray, np.ndarray]] = {}
+        self._along: dict[State, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def posture(self, state: State) -> Stance:
         """The posture of the row, whatever the state asks for."""
@@ -95,16 +95,23 @@ class PlayedModel(Model):
         if key not in self._along:
             rows = np.unique(np.linspace(0, len(self.run) - 1, _CURVE_POINTS).astype(int))
             names, limits = self.criteria_of(view.state), self.limits_of(view.state)
-            margins = []
+            found = []
             for row in rows:
                 if stale():
                     return view
                 here = self.run.at(int(row))
-                margins.append([least_margin(here, c, limits) for c in names.values()])
-            self._along = {key: (self.run.values[rows], np.array(margins).T)}
-        values, found = self._along[key]
+                found.append([least_values(here, c, limits) for c in names.values()])
+            margins, shares = np.array(found).transpose(2, 1, 0)
+            self._along = {key: (self.run.values[rows], margins, shares)}
+        values, margins, shares = self._along[key]
         order = np.argsort(values)
-        return replace(view, curve_y=values[order], curve_margin=found[:, order])
+        return replace(
+            view,
+            curve_y=values[order],
+            curve_criteria=tuple(self.criteria_of(view.state)),
+            curve_margin=margins[:, order],
+            curve_share=shares[:, order],
+        )
 
     def code(self, state: State) -> tuple[str, str]:
         """What of the row can be said: no command, but Python."""

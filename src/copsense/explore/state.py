@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import math
 import shlex
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal, NamedTuple
 
-from copsense.arrays import finite_number
+from copsense.arrays import check_type, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import LIMIT_NAMES, Limits
+from copsense.loads import Load
 from copsense.path import COM_COORDINATES
 
 _OWN: Literal["own"] = "own"
@@ -42,6 +43,7 @@ class State:
         limits: what the wrenches respect; None for nothing, ``"own"`` for the stance file's, or
             nothing where it has none.
         overlays: what is drawn beside the robot; it changes no number.
+        loads: known forces on the robot, beside the stance's own.
     """
 
     words: tuple[str, ...] = ()
@@ -51,6 +53,7 @@ class State:
     length: float = 1.0
     limits: Limits | Literal["own"] | None = _OWN
     overlays: frozenset[str] = frozenset()
+    loads: tuple[Load, ...] = ()
 
     def __post_init__(self) -> None:
         """Own the values."""
@@ -63,6 +66,9 @@ class State:
         object.__setattr__(self, "words", tuple(map(str, self.words)))
         object.__setattr__(self, "criteria", tuple(map(str, self.criteria)))
         object.__setattr__(self, "overlays", frozenset(map(str, self.overlays)))
+        object.__setattr__(self, "loads", tuple(self.loads))
+        for load in self.loads:
+            check_type(load, Load, "a load of a state", "Give copsense.Load(...).")
         length = finite_number(self.length, "the characteristic length L [m]", positive=True)
         object.__setattr__(self, "length", length)
         freeze(self, "coordinates")
@@ -117,6 +123,9 @@ class State:
             parts += ["--characteristic-length", f"{self.length!r}m"]
         if isinstance(self.limits, Limits):
             parts += ["--limits", limits_text(self.limits)]
+        for load in self.loads:
+            option = "--load" if load.fixed_to == "world" else "--body-load"
+            parts += [option, _load_text(load)]
         return shlex.join(parts)
 
     def to_python(self, before: str = "", posture: str = "{stance}") -> str:
@@ -149,6 +158,10 @@ class State:
             criteria = f"[{each}]"
         if not isinstance(self.limits, str):
             limits = "None" if self.limits is None else _limits_code(self.limits)
+        if self.loads:
+            each = ", ".join(_load_code(load) for load in self.loads)
+            lines += [f"stance = {stance}", f"stance = stance.with_loads([*stance.loads, {each}])"]
+            stance = "stance"
         arguments = [posture.replace("{stance}", stance), criteria, limits]
         if self.held and self.coordinates:
             arguments.append(f"at={self.at!r}")
@@ -171,6 +184,7 @@ class State:
             "criteria": list(self.criteria),
             "length": self.length,
             "limits": limits,
+            "loads": [asdict(load) for load in self.loads],
             "overlays": sorted(self.overlays),
         }
 
@@ -198,7 +212,13 @@ class State:
         try:
             if "coordinates" in values:
                 values["coordinates"] = {n: Setting(*s) for n, s in values["coordinates"].items()}
-            for name, kind in (("words", tuple), ("criteria", tuple), ("overlays", frozenset)):
+            kinds: dict[str, Callable[[Any], Any]] = {
+                "words": tuple,
+                "criteria": tuple,
+                "overlays": frozenset,
+                "loads": _loads,
+            }
+            for name, kind in kinds.items():
                 if not isinstance(values.get(name, []), list):
                     raise TypeError(f"{name} is not a list")
                 values[name] = kind(values.get(name, []))
@@ -223,6 +243,36 @@ class State:
             raise InvalidInputError(
                 f"a state is JSON, as State.to_json() writes it: {error}."
             ) from None
+
+
+def _loads(tables: list[dict[str, Any]]) -> tuple[Load, ...]:
+    triples = ("force", "moment", "point")
+    found = []
+    for table in tables:
+        values: dict[str, Any] = {k: tuple(v) if k in triples else v for k, v in table.items()}
+        found.append(Load(**values))
+    return tuple(found)
+
+
+def _load_text(load: Load) -> str:
+    """A load as ``--load`` has it."""
+    at = "" if not any(load.point) else f"@{_numbers(load.point)}"
+    moment = f":{_numbers(load.moment)}" if any(load.moment) else ""
+    return f"{load.frame}{at}={_numbers(load.force)}{moment}"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ":".join(repr(float(value)) for value in values)
+
+
+def _load_code(load: Load) -> str:
+    usual = Load(load.frame)
+    more = "".join(
+        f", {each.name}={getattr(load, each.name)!r}"
+        for each in fields(load)
+        if getattr(load, each.name) != getattr(usual, each.name)
+    )
+    return f"copsense.Load({load.frame!r}{more})"
 
 
 def limits_text(limits: Limits) -> str:

@@ -106,12 +106,18 @@ class View(ShortRepr):
         contacts: names.
         placements: of each contact in the world, as `poses`.
         soles: outline of each sole in the world [m]; no corner without a sole.
+        load_points: where known loads act, in the world [m].
+        load_forces: and with which force, world axes [N].
         torque_names: of the torques.
+        torque_units: ``"Nm"`` or ``"N"`` for each.
         criteria: what each criterion says.
         notes: joints beyond their limits, criteria that are left out, and why.
         reason: why the state has no posture; the rest is then the last view that had one.
         curve_y: world y of the CoM along the lateral path [m]; empty until it is known.
-        curve_margin: least margin of any contact there, criterion by criterion [m].
+        curve_criteria: whose curves follow.
+        curve_margin: least margin of any contact there, criterion by criterion [m]; NaN without a
+            sole.
+        curve_share: least share of the weight that any contact carries there, likewise.
         regions: of the CoM; None until they are known.
         binding: what is met first on the way to either side within limits, a line each; None until
             it is known.
@@ -130,12 +136,17 @@ class View(ShortRepr):
     contacts: tuple[str, ...]
     placements: Float[np.ndarray, "nc 7"]
     soles: tuple[np.ndarray, ...]
+    load_points: Float[np.ndarray, "l 3"]
+    load_forces: Float[np.ndarray, "l 3"]
     torque_names: tuple[str, ...]
+    torque_units: tuple[str, ...]
     criteria: tuple[CriterionView, ...]
     notes: tuple[str, ...] = ()
     reason: str = ""
     curve_y: Float[np.ndarray, " m"] = field(default_factory=lambda: np.zeros(0))
+    curve_criteria: tuple[str, ...] = ()
     curve_margin: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
+    curve_share: Float[np.ndarray, "k m"] = field(default_factory=lambda: np.zeros((0, 0)))
     regions: tuple[RegionView, ...] | None = None
     binding: tuple[str, ...] | None = None
     row: int | None = None
@@ -143,8 +154,9 @@ class View(ShortRepr):
 
     def __post_init__(self) -> None:
         """Own the arrays."""
-        arrays = ("q", "com", "poses", "bones", "placements", "soles", "curve_y", "curve_margin")
-        freeze(self, *arrays, *(("measured",) if self.measured is not None else ()))
+        arrays = ("q", "com", "poses", "bones", "placements", "soles", "load_points", "load_forces")
+        given = ("measured",) if self.measured is not None else ()
+        freeze(self, *arrays, "curve_y", "curve_margin", "curve_share", *given)
 
     def __getitem__(self, name: str) -> CriterionView:
         """What the criterion of that name says."""
@@ -250,7 +262,7 @@ def posture_parts(stance: Stance) -> dict[str, Any]:
     model = stance.robot.model
     data = model.createData()
     pin.forwardKinematics(model, data, np.array(stance.q))
-    soles = []
+    soles, applied, names = [], stance.applied, stance.robot.torque_names
     for contact, place in zip(stance.contacts, stance.placements, strict=True):
         flat = np.zeros((0, 2)) if contact.sole is None else contact.sole.vertices
         corners = np.column_stack([flat, np.zeros(len(flat))])
@@ -264,8 +276,17 @@ def posture_parts(stance: Stance) -> dict[str, Any]:
         "contacts": stance.contact_names,
         "placements": poses_of(list(stance.placements)),
         "soles": tuple(soles),
-        "torque_names": stance.robot.torque_names,
+        "load_points": np.zeros((0, 3)) if applied is None else applied.points,
+        "load_forces": np.zeros((0, 3)) if applied is None else applied.wrenches[:, :3],
+        "torque_names": names,
+        "torque_units": tuple(_torque_unit(stance, name) for name in names),
     }
+
+
+def _torque_unit(stance: Stance, name: str) -> str:
+    """Of a torque's joint; motors that turn several joints are rotary."""
+    units = dict(zip(stance.robot.dof_names, stance.robot.dof_units, strict=True))
+    return "N" if units.get(name) == "m" else "Nm"
 
 
 def criterion_view(name: str, found: CopSensitivity, limits: Limits | None) -> CriterionView:
