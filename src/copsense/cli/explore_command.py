@@ -186,13 +186,13 @@ def _serve(
 
     from copsense.explore.explorer import Explorer
 
-    # Background jobs of a shell ignore SIGINT; whoever sends one, or a SIGTERM, wants an end.
     over = threading.Event()
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, lambda *_: over.set())
     with Explorer(
         model, state, port=port, host=host, meshes=meshes, light=light, dark=dark
     ) as explorer:
+        # Background jobs of a shell ignore SIGINT; whoever sends one, or a SIGTERM, wants an end.
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, lambda *_: over.set())
         if as_json:
             echo_json({"url": explorer.url, "seconds": explorer.seconds})
         else:
