@@ -9,6 +9,7 @@ from support.driven_robots import everything, standing
 
 import copsense
 from copsense import Contact, Limits, Load
+from copsense.batch import chart_posture
 from copsense.cli import copsense as command
 from copsense.errors import (
     CopsenseError,
@@ -197,6 +198,13 @@ BAD = {
     'robot = "icub"\nlocked = ["elbow"]': (UnknownNameError, "l_elbow"),
     'robot = "icub"\n[drives]\nmotor = []': (UnknownNameError, "motors"),
     'robot = "icub"\n[[drives.loops]]\nframe_a = "l_hand"': (InvalidInputError, "frame_b"),
+    'robot = "icub"\n[posture_m]\nl_knee = 0.3': (InvalidInputError, "posture_deg or posture_rad"),
+    'robot = "icub"\n[joints_m]\nl_knee = -0.3': (InvalidInputError, "joints_deg or joints_rad"),
+    'robot = "icub"\n[at_deg]\ncom_y = 2': (InvalidInputError, r"com_y, which is in metres.*at_m"),
+    'robot = "icub"\n[at_m]\npitch = 0.1': (InvalidInputError, "at_deg or at_rad"),
+    'robot = "icub"\n[at_m]\ncom_w = 0.1': (UnknownNameError, "com_x"),
+    'robot = "icub"\n[at_m]\ncom_z = 9': (CopsenseError, "com_z"),
+    'robot = "icub"\ncom_y_m = 0.01\n[at_m]\ncom_x = 0': (InvalidInputError, "Leave one out"),
     'robot = "icub"\nloads = 3': (InvalidInputError, "loads"),
 }
 
@@ -220,6 +228,24 @@ def test_a_file_and_a_robot_or_an_argument_contradict_each_other(table):
         copsense.load_stance(table, width=0.2)
     with pytest.raises(ModelLoadError, match=r"missing\.toml"):
         copsense.load_stance(table.parent / "missing.toml")
+
+
+def test_coordinates_of_a_chart_are_those_of_the_command(tmp_path):
+    """The one posture, said in a file, in the shell and in Python."""
+    path = tmp_path / "lean.toml"
+    path.write_text(
+        'robot = "icub"\n[at_m]\ncom_y = 0.02\n"l_sole:x" = 0.03\n[at_deg]\npitch = 4.0\n',
+        encoding="utf-8",
+    )
+    read = copsense.load_stance(path)
+    at = {"com_y": 0.02, "l_sole:x": 0.03, "pitch": np.radians(4.0)}
+    np.testing.assert_allclose(read.q, chart_posture(copsense.load_stance("icub"), at).q, atol=1e-12)
+    assert read.com[1] == pytest.approx(0.02, abs=1e-9)
+    saved = tmp_path / "saved.toml"
+    words = ["--at", "com_y=20mm", "--at", "l_sole:x=0.03", "--at", "pitch=4"]
+    run = CliRunner().invoke(command, ["analyse", "icub", *words, "--save-stance", str(saved)])
+    assert run.exit_code == 0, run.output
+    np.testing.assert_allclose(copsense.load_stance(saved).q, read.q, atol=1e-12)
 
 
 def test_drives_that_were_taken_off_a_file_stay_off(tmp_path):

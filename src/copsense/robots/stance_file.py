@@ -29,6 +29,7 @@ from copsense.loads import Load, SpringLoad
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS
 from copsense.robots.stance_tables import (
+    check_units,
     configuration_data,
     contact_data,
     drives_data,
@@ -66,6 +67,9 @@ _STANDING = (
     "joints_deg",
     "joints_rad",
     "joints_m",
+    "at_deg",
+    "at_rad",
+    "at_m",
 )
 _KEYS = (
     "robot",
@@ -166,6 +170,7 @@ class StanceFile:
             raise
 
     def _stance(self) -> Stance:
+        from copsense.batch import PostureChart, chart_posture
         from copsense.posture import carry_payload, move_stance
         from copsense.robots.standing import load_robot, load_stance
 
@@ -210,6 +215,7 @@ class StanceFile:
             drives=drives,
             locked=locked,
         )
+        check_units(data, "posture", stance.robot.joint_unit)
         for payload in payloads:
             stance = carry_payload(stance, payload["frame"], payload["mass"], com=payload["com"])
         com = {
@@ -217,8 +223,20 @@ class StanceFile:
             for key in ("com_x_m", "com_y_m", "com_z_m")
             if key in data
         }
+        joints, at = read_positions(data, "joints"), read_positions(data, "at")
         loaded = stance.with_loads(loads) if loads else stance
-        return move_stance(loaded, **com, joints=read_positions(data, "joints"))
+        if not at:
+            moved = move_stance(loaded, **com, joints=joints)
+            check_units(data, "joints", stance.robot.joint_unit)
+            return moved
+        if com or joints:
+            raise InvalidInputError(
+                "[at_m], [at_deg] and [at_rad] say where the CoM and the joints are, and so do "
+                "com_x_m, com_y_m, com_z_m and [joints_deg]. Leave one out: at takes their names."
+            )
+        chart = PostureChart(loaded, tuple(at), compiled=False)
+        check_units(data, "at", dict(zip(at, chart.units, strict=True)).__getitem__)
+        return chart_posture(loaded, at)
 
 
 def save_stance(

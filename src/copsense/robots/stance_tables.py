@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -72,6 +72,30 @@ def read_positions(data: Mapping[str, Any], name: str) -> dict[str, float]:
                 raise InvalidInputError(f"{key} says where joint {joint} is again. Say it once.")
             found[joint] = finite_number(value, f"{key}.{joint}") * float(size)
     return found
+
+
+def check_units(
+    data: Mapping[str, Any], name: str, unit_of: Callable[[str], Literal["rad", "m"]]
+) -> None:
+    """Reject metres of what turns, and angles of what slides, in ``[NAME_deg]``, ``_rad``, ``_m``.
+
+    Args:
+        data: the file.
+        name: of the tables.
+        unit_of: the unit of a joint or coordinate.
+
+    Raises:
+        InvalidInputError: the message names the table to write it in.
+    """
+    for unit in ("deg", "rad", "m"):
+        key = f"{name}_{unit}"
+        for what in data.get(key, {}):
+            if (unit == "m") != (unit_of(what) == "m"):
+                right = f"{name}_deg or {name}_rad" if unit == "m" else f"{name}_m"
+                raise InvalidInputError(
+                    f"{key} has {what}, which is {'an angle' if unit == 'm' else 'in metres'}. "
+                    f"Write it in [{right}]."
+                )
 
 
 _CONTACT = (
