@@ -239,7 +239,9 @@ def test_coordinates_of_a_chart_are_those_of_the_command(tmp_path):
     )
     read = copsense.load_stance(path)
     at = {"com_y": 0.02, "l_sole:x": 0.03, "pitch": np.radians(4.0)}
-    np.testing.assert_allclose(read.q, chart_posture(copsense.load_stance("icub"), at).q, atol=1e-12)
+    np.testing.assert_allclose(
+        read.q, chart_posture(copsense.load_stance("icub"), at).q, atol=1e-12
+    )
     assert read.com[1] == pytest.approx(0.02, abs=1e-9)
     saved = tmp_path / "saved.toml"
     words = ["--at", "com_y=20mm", "--at", "l_sole:x=0.03", "--at", "pitch=4"]

@@ -1,5 +1,6 @@
 """Couplings, loops and joints without motors of a URDF; what is assumed or left out is said."""
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -181,3 +182,44 @@ def test_no_effort_is_said_and_can_be_no_motor():
     assert 'Joints l_ankle_roll have effort="0"' in robot.notes[0]
     idle = copsense.load_robot(text, passive=["l_ankle_roll"])
     assert idle.torque_names == moving(robot, "l_ankle_roll")
+
+
+def test_a_mimic_holds_and_carries_what_it_does_in_mujocos_own_reader():
+    """MuJoCo reads the same URDF, its base held: its equalities leave no other motion, and carry
+    exactly what the motors and contacts leave of the joints' weight."""
+    more = {"r_yaw": MIMIC.format("l_yaw", -0.7, 0.02), "r_roll": MIMIC.format("r_yaw", 0.5, 0)}
+    text = urdf(more=more)
+    found = solve_equilibrium(stand(text, l_yaw=0.05), minimum_torque())
+    stance, robot = found.stance, found.stance.robot
+    twin = mujoco.MjModel.from_xml_string(text)
+    turn = pin.Quaternion(*np.roll(stance.q[3:7], 1)).matrix()
+    twin.opt.gravity[:] = turn.T @ [0.0, 0.0, -9.81]  # its base is level
+    twin.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    data = mujoco.MjData(twin)
+    names = [twin.joint(j).name for j in range(twin.njnt)]
+    assert sorted(names) == sorted(robot.joint_names)
+    data.qpos[:] = [robot.joint_position(stance.q, name) for name in names]
+    mujoco.mj_forward(twin, data)
+    equal = np.array(data.efc_type[: data.nefc]) == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
+    assert equal.sum() == 2
+    np.testing.assert_allclose(data.efc_pos[: data.nefc][equal], 0.0, atol=1e-12)
+    J = np.array(data.efc_J).reshape(-1, twin.nv)[: data.nefc][equal]
+    columns = [robot.velocity_index(name) for name in names]
+    np.testing.assert_allclose(J @ stance.admissible_motions[columns], 0.0, atol=1e-12)
+    # Their rows and ours span the same.
+    ours = stance.closures.jacobian[:, columns]
+    assert np.linalg.matrix_rank(np.vstack([J, ours]), tol=1e-9) == len(ours) == 2
+    torques = dict(zip(robot.torque_names, found.torques, strict=True))
+    left = data.qfrc_bias - [torques.get(name, 0.0) for name in names]
+    for contact, place, wrench in zip(
+        stance.contacts, stance.placements, found.wrenches, strict=True
+    ):
+        linear, angular = np.zeros((3, twin.nv)), np.zeros((3, twin.nv))
+        point = turn.T @ (place.translation - stance.q[:3])
+        body = twin.body(contact.frame).id
+        mujoco.mj_jac(twin, data, linear, angular, point, body)
+        axes = turn.T @ place.rotation
+        left -= linear.T @ axes @ wrench[:3] + angular.T @ axes @ wrench[3:]
+    carried = np.linalg.lstsq(J.T, left)[0]
+    np.testing.assert_allclose(J.T @ carried, left, atol=1e-9 * robot.weight)
+    assert np.abs(left).max() > 1e-3  # something to carry
