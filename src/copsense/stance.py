@@ -371,8 +371,15 @@ class Stance:
             Y = right[count:].T
             if Y.shape[1]:  # u that some motion lets forces Y hold is free to first order only
                 Z = self._motions.null
-                held = [(Y.T @ self.motion_derivative(u) @ Z).ravel() for u in U.T]
-                _, s, vt = np.linalg.svd(np.array(held).T)
+                # y' d(J u)/dq = u' d(J' y)/dq: whichever are fewer.
+                if U.shape[1] <= Y.shape[1]:
+                    held = np.array([Y.T @ self.motion_derivative(u) @ Z for u in U.T])
+                else:
+                    weightless = np.zeros(3)
+                    turned = [U.T @ self.curvature(y, weightless) @ Z for y in Y.T]
+                    held = np.array(turned).transpose(1, 0, 2)
+                tall = held.reshape(U.shape[1], -1).T
+                _, s, vt = np.linalg.svd(tall, full_matrices=tall.shape[0] < tall.shape[1])
                 U = U @ vt[int(np.sum(s > _PASSING)) :].T
             A = self.balance_derivative(f)
             left, s, _ = np.linalg.svd(U.T @ A, full_matrices=False)

@@ -159,7 +159,9 @@ def lines_to_try(
             offsets={frame: offset for frame, offset in offsets.items() if any(offset)},
         )
     tilted = not start.own and any(f.sole is not None and f.sole.tilt for f in surfaces)
-    for level, posture in product((True, False) if tilted else (start.level_soles,), postures):
+    postures = list(postures)
+    distinct = [p for i, p in enumerate(postures) if p not in postures[:i]]
+    for level, posture in product((True, False) if tilted else (start.level_soles,), distinct):
         yield replace(start, posture=posture, level_soles=level)
 
 
