@@ -3,6 +3,7 @@
 import copy
 import inspect
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from support.tiny import urdf
 
 import copsense
 from copsense import errors
+from copsense.drives import Coupling
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
+from copsense.freedom import repetition_notes
 
 
 @pytest.fixture(scope="module")
@@ -125,8 +128,31 @@ def test_an_audit_cannot_be_passed_by_a_tolerance_that_is_no_number(icub):
 
 
 def test_an_audit_says_where_and_by_how_much_it_failed(icub):
-    with pytest.raises(errors.SensitivityMismatchError, match=r"centre of pressure .* relative"):
+    said = r"derivative of the .* relative, .* do not decide.* Move the posture"
+    with pytest.raises(errors.SensitivityMismatchError, match=said):
         copsense.check_sensitivity(icub, copsense.minimum_torque(), tolerance=0.0)
+
+
+def test_an_audit_of_a_loop_that_all_but_repeats_the_contacts_takes_a_shorter_step():
+    drives = copsense.Drives(couplings=(Coupling("r_hip_yaw", "l_hip_yaw", -1.0),))
+    stance = copsense.load_stance("icub", drives=drives)
+    assert repetition_notes(stance)
+    for criterion in (copsense.minimum_torque(), copsense.minimum_wrench(1.0)):
+        copsense.check_sensitivity(stance, criterion)
+
+
+def test_an_audit_of_a_wrong_derivative_asks_for_a_report(icub, monkeypatch):
+    """Differences that agree among themselves, and not with it."""
+    exact = copsense.sensitivity.cop_sensitivity
+
+    def wrong(*words):
+        found = exact(*words)
+        return replace(found, torque_derivative=found.torque_derivative * (1 + 1e-5))
+
+    monkeypatch.setattr("copsense.sensitivity.cop_sensitivity", wrong)
+    said = r"derivative of the torque .* 1\.0.e-05 relative.* please report it"
+    with pytest.raises(errors.SensitivityMismatchError, match=said):
+        copsense.check_sensitivity(icub, copsense.minimum_torque())
 
 
 def test_a_margin_is_of_a_point_and_a_polygon_in_order(icub):
@@ -182,6 +208,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
         errors.UnloadedContactError(("l_sole",)),
         errors.UndeterminedWrenchError("open", ("l_sole fz",)),
         errors.InfeasibleError(3.0, ("l_sole: normal force",)),
+        errors.ImpossibleInertiaError("rods", ("link 'rod' (1 kg) has ...",)),
         errors.UnsolvedError(1e-3),
         errors.UnbalancedError("rods", {"forearm": 0.8}),
         errors.UnstablePostureError("rods", ("forearm",), -0.8),
@@ -194,6 +221,7 @@ def test_every_error_is_of_one_family_and_survives_copies():
                 errors.MissingExtraError,
                 errors.UnloadedContactError,
                 errors.UndeterminedWrenchError,
+                errors.ImpossibleInertiaError,
                 errors.InfeasibleError,
                 errors.UnsolvedError,
                 errors.UnbalancedError,
