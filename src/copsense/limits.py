@@ -167,6 +167,13 @@ def _of(limit: float | Mapping[str, float] | None, contact: Contact) -> float | 
     return limit.get(contact.name) if isinstance(limit, Mapping) else limit
 
 
+def friction_of(contact: Contact, limits: Limits) -> float | None:
+    """The coefficient of friction that limits give a contact; None where it is not limited."""
+    if isinstance(limits.friction, str):
+        return contact.friction
+    return _of(limits.friction, contact)
+
+
 NO_LIMITS = Limits(normal_force=None, friction=None, cop_margin=None, torsion=None)
 
 
@@ -363,9 +370,7 @@ def _contact_rows(contact: Contact, limits: Limits) -> list[Row]:
     least = _of(limits.normal_force, contact)
     if least is not None:
         rows.append(("normal force", "normal force", _unit(2) * -1.0, -least))
-    mu = contact.friction
-    if not isinstance(limits.friction, str):
-        mu = _of(limits.friction, contact)
+    mu = friction_of(contact, limits)
     if mu is not None:
         rows += _pyramid_rows(contact, mu, limits.friction_sides)
     margin = _of(limits.cop_margin, contact)

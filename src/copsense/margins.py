@@ -111,6 +111,21 @@ class MarginTable:
         contact = -force_rates @ self._contact_rows.matrix.T
         return np.concatenate([contact, -self._sign * torque_rates[..., self._joint]], axis=-1)
 
+    def value_rates(
+        self,
+        values: Float[np.ndarray, " r"],
+        slack_rates: Float[np.ndarray, "r p"],
+        forces: Float[np.ndarray, " m"],
+        force_rates: Float[np.ndarray, "m p"],
+    ) -> Float[np.ndarray, "r p"]:
+        """Derivatives of `values` in p directions, by those of the slacks and of the forces."""
+        found = np.array(slack_rates)
+        # value = slack / f_z of a centre of pressure: the quotient rule.
+        normal = forces[self._under][:, None]
+        change = values[self._cop][:, None] * force_rates[self._under]
+        found[self._cop] = (found[self._cop] - change) / normal
+        return found
+
     def group_margins(
         self, forces: Float[np.ndarray, "*p m"], torques: Float[np.ndarray, "*p n"]
     ) -> Float[np.ndarray, "*p g"]:

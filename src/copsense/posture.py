@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import check_type, checked_positions, finite_array, finite_number, owned
@@ -164,15 +164,8 @@ def solve_posture(
             requests = len(axes) + len(columns)
             rate = np.zeros((len(h) if spread is None else len(spread), requests))
             rate[len(h) - requests : len(h)] = np.eye(requests)
-            right = np.zeros((len(K), requests))
-            right[robot.model.nv :] = rate if spread is None else spread.T @ rate
-            tangents = _solve(K, right)[: robot.model.nv]
-            # What the contacts hold fast has no tangent: least squares would move a contact.
-            whole = C if spread is None else np.vstack([C, here.fold_equations[0]])
-            missed = np.abs(whole @ tangents - rate).max(axis=0, initial=0.0)
-            fastest = np.abs(tangents).max(axis=0, initial=1.0)
-            runs_away = (fastest > _RUNAWAY) & (spread is not None)
-            tangents[:, (missed > 1e-6 * fastest) | runs_away] = 0.0
+            tangents, followed = _tangents(here, K, C, rate, spread)
+            tangents[:, ~followed] = 0.0
             return Posture(stance.at(here.q), tangents, iteration)
         step = _solve(K, -np.concatenate([stationarity, errors]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
@@ -183,6 +176,37 @@ def solve_posture(
         multipliers = multipliers + length * step[robot.model.nv :]
         multipliers = _carried(multipliers, before, here) if spread is None else None
     raise UnreachablePostureError(_what_remains(here, h, axes, list(joints), wanted))
+
+
+def contact_motions(
+    stance: Stance,
+) -> tuple[Float[np.ndarray, "nv m"], Bool[np.ndarray, " m"]]:
+    """How the posture follows contacts whose places move, its CoM over the same point.
+
+    The tangents of ``solve_posture(stance, com=(x, y, None), targets=...)``: joints and trunk give
+    way as little as its cost allows.
+
+    Args:
+        stance: robot, posture and contacts, at rest.
+
+    Returns:
+        dq per displacement of a contact along each row of stacked forces (nv, m), contact axes
+        [m, rad], and which of them the robot can follow (m,); the column of another is zero.
+    """
+    check_stance(stance)
+    check_at_rest(stance, "a posture to search for")
+    axes = [0, 1] if stance.robot.base_nv == 6 else [1]
+    swing = stance.hanging_derivative / stance.robot.weight
+    C = np.vstack([stance.constraints, swing, stance.com_jacobian[axes]])
+    A, _, spread = _independent(stance, C, np.zeros(len(C)))
+    m = len(stance.row_names)
+    rate = np.zeros((len(C) if spread is None else len(spread), m))
+    rate[:m] = np.eye(m)
+    # At its own reference no constraint has a multiplier, so that none curves the cost.
+    K = _bordered(np.diag(_weights(stance, PostureCost())), A)
+    tangents, followed = _tangents(stance, K, C, rate, spread)
+    tangents[:, ~followed] = 0.0
+    return tangents, followed
 
 
 def move_stance(
@@ -387,6 +411,22 @@ def _independent(
     u, s, _ = np.linalg.svd(np.vstack([C, rows]), full_matrices=False)
     spread = u[:, s > RANK_TOLERANCE * max(1.0, s[0])]
     return spread.T @ np.vstack([C, rows]), spread.T @ np.concatenate([h, errors]), spread
+
+
+def _tangents(
+    here: Stance, K: np.ndarray, C: np.ndarray, rate: np.ndarray, spread: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """dq for rates of C q, or of [C; F] where there is a spread, and which can be followed."""
+    nv = here.robot.model.nv
+    right = np.zeros((len(K), rate.shape[1]))
+    right[nv:] = rate if spread is None else spread.T @ rate
+    tangents = _solve(K, right)[:nv]
+    # What the contacts hold fast has no tangent: least squares would move a contact.
+    whole = C if spread is None else np.vstack([C, here.fold_equations[0]])
+    missed = np.abs(whole @ tangents - rate).max(axis=0, initial=0.0)
+    fastest = np.abs(tangents).max(axis=0, initial=1.0)
+    runs_away = (fastest > _RUNAWAY) & (spread is not None)
+    return tangents, ~((missed > 1e-6 * fastest) | runs_away)
 
 
 def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from scipy.linalg import lapack
 
 from copsense.arrays import array_property
+from copsense.changes import StanceChange
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError
 from copsense.load_problem import LoadProblem
@@ -111,34 +112,42 @@ class Quadratic(ShortRepr):
             return np.linalg.solve((self.torque @ M + self.inertia * np.eye(len(M))).T, M.T).T
         return self._constant_compliance
 
-    def compliance_derivative(
-        self, stance: Stance, problem: LoadProblem, multipliers: Float[np.ndarray, " nv"]
-    ) -> Float[np.ndarray, "a nv"]:
-        """d(P nu_j)/dq at fixed nu: zero unless the weight follows the inertia.
+    def compliance_change(
+        self,
+        stance: Stance,
+        problem: LoadProblem,
+        multipliers: Float[np.ndarray, " nv"],
+        change: StanceChange,
+    ) -> Float[np.ndarray, "a p"]:
+        """d(P nu_j) at fixed nu: zero unless the weight follows the inertia.
 
         Multipliers stand in the order of `Robot.by_drive`.
         """
         if not self.inertia:
-            return np.zeros((int(self.active.sum()), len(multipliers)))
+            return np.zeros((int(self.active.sum()), change.directions.shape[1]))
         nb = stance.robot.unactuated_nv
         # With S = D M + c 1: dP nu = (1 - P D) dM S^-1 nu.
         M = problem.joint_inertia
         S = self.torque @ M + self.inertia * np.eye(len(M))
         inner = np.zeros_like(multipliers)
         inner[nb:] = np.linalg.solve(S, multipliers[nb:])
-        change = _inertia_derivative(stance, inner)[nb:]
-        return np.asarray(change - self.compliance(problem) @ (self.torque @ change))
+        moved = change.inertia(stance, inner)[nb:]
+        return np.asarray(moved - self.compliance(problem) @ (self.torque @ moved))
 
-    def torque_weight_derivative(
-        self, stance: Stance, problem: LoadProblem, torques: Float[np.ndarray, " n"]
-    ) -> Float[np.ndarray, "n nv"]:
-        """d(W_tau tau)/dq at fixed tau: -c M^-1 dM M^-1 tau."""
+    def torque_weight_change(
+        self,
+        stance: Stance,
+        problem: LoadProblem,
+        torques: Float[np.ndarray, " n"],
+        change: StanceChange,
+    ) -> Float[np.ndarray, "n p"]:
+        """d(W_tau tau) at fixed tau: -c M^-1 dM M^-1 tau."""
         nb, M = stance.robot.unactuated_nv, problem.joint_inertia
         if not self.inertia:
-            return np.zeros((len(torques), nb + len(torques)))
+            return np.zeros((len(torques), change.directions.shape[1]))
         inner = np.zeros(nb + len(torques))
         inner[nb:] = np.linalg.solve(M, torques)
-        moved = _inertia_derivative(stance, inner)[nb:]
+        moved = change.inertia(stance, inner)[nb:]
         return np.asarray(-self.inertia * np.linalg.solve(M, moved))
 
     @cached_property
@@ -154,11 +163,3 @@ class Quadratic(ShortRepr):
     def _constant_compliance(self) -> Float[np.ndarray, "a a"]:
         on = self.active
         return np.asarray(np.linalg.inv(self.torque[np.ix_(on, on)]))
-
-
-def _inertia_derivative(
-    stance: Stance, acceleration: Float[np.ndarray, " nv"]
-) -> Float[np.ndarray, "nv nv"]:
-    """d(M a)/dq, with a and the rows in the order of `Robot.by_drive`."""
-    robot = stance.robot
-    return robot.by_drive(stance.inertia_derivative(robot.from_drives(acceleration)))

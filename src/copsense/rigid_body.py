@@ -103,6 +103,34 @@ def gravity(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " nv
     return owned(pin.computeGeneralizedGravity(memory.model, memory.data, q))
 
 
+def gravity_under(
+    robot: Robot, q: Float[np.ndarray, " nq"], pull: Float[np.ndarray, " 3"]
+) -> Float[np.ndarray, " nv"]:
+    """Generalised gravity of another pull than the model's (3,) [m/s^2], in which it is linear."""
+    memory = _scratch(robot)
+    return owned(pin.computeGeneralizedGravity(memory.tilted(pull), memory.data, q))
+
+
+def inertial_regressor(
+    robot: Robot,
+    q: Float[np.ndarray, " nq"],
+    acceleration: Float[np.ndarray, " nv"] | None = None,
+) -> Float[np.ndarray, "nv k"]:
+    """Y with G + M a = Y pi, pi the links' inertial parameters (10 (njoints - 1),).
+
+    Of each joint's link ``pin.Inertia.toDynamicParameters``: mass, first moment, and inertia about
+    the joint's frame, in its axes.
+
+    Args:
+        robot: the robot.
+        q: configuration (nq,).
+        acceleration: a (nv,); None at rest.
+    """
+    memory = _scratch(robot)
+    a = memory.still if acceleration is None else acceleration
+    return owned(pin.computeJointTorqueRegressor(memory.model, memory.data, q, memory.still, a))
+
+
 def com(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " 3"]:
     """Centre of mass in the world [m]."""
     memory = _scratch(robot)

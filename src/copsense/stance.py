@@ -548,22 +548,6 @@ class Stance:
         """
         return self._balance_derivative(forces, None)
 
-    def load_change(
-        self,
-        forces: Float[np.ndarray, " c"],
-        directions: Float[np.ndarray, "nv p"],
-        load_rate: Float[np.ndarray, "nv p"] | None,
-    ) -> Float[np.ndarray, "nv p"]:
-        """A V, and what N changes by besides, in the order of `Robot.by_drive`.
-
-        Args:
-            forces: stacked forces f (c,) that A is taken at.
-            directions: velocities V as columns.
-            load_rate: the change of N besides; None for none.
-        """
-        found = self.balance_derivative(forces).dot(directions)
-        return self.robot.by_drive(found if load_rate is None else found + load_rate)
-
     def motion_load_rate(
         self, velocity_rate: Float[np.ndarray, " nv"], acceleration_rate: Float[np.ndarray, " nv"]
     ) -> Float[np.ndarray, " nv"]:

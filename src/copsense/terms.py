@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +14,7 @@ from copsense.arrays import finite_array, read_only
 from copsense.contact import Contact
 from copsense.content import ByContent, own, plain, show
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.patterns import by_name
 from copsense.quadratic import Quadratic
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 
@@ -191,19 +191,9 @@ def _torque_matrix(criterion: str, term: TorqueTerm, robot: Robot) -> np.ndarray
 
 def _by_joint(criterion: str, weights: Mapping[str, float], names: Sequence[str]) -> list[float]:
     """Weights in the joints' order; a name with a star is of every joint that it fits."""
-    found: dict[str, tuple[str, float]] = {}
-    # A joint's own name before a pattern, and a pattern before the star alone.
-    for key in sorted(weights, key=lambda key: ("*" in key, key == "*")):
-        fits = [name for name in names if fnmatchcase(name, key)]
-        if not fits and key != "*":
-            raise UnknownNameError(f"joint in the weights of {criterion!r}", key, names)
-        for name in fits:
-            by, weight = found.setdefault(name, (key, weights[key]))
-            if "*" in by and by != key and key != "*" and weight != weights[key]:
-                raise InvalidInputError(
-                    f"criterion {criterion!r}: {by!r} and {key!r} both fit {name}, with different "
-                    "weights. Name the joint itself, or patterns that do not overlap."
-                )
+    found = by_name(
+        weights, names, f"joint in the weights of {criterion!r}", f"criterion {criterion!r}"
+    )
     return [found.get(name, ("", 0.0))[1] for name in names]
 
 

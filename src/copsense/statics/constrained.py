@@ -25,6 +25,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from copsense.arrays import owned
+from copsense.changes import StanceChange
 from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.errors import (
@@ -191,8 +192,20 @@ class ConstrainedEquilibrium(StaticEquilibrium):
             directions: velocities V with J V = 0, as columns.
             load_rate: how N changes besides, as of `StaticEquilibrium.derivative`.
         """
+        return self.response(StanceChange(directions, load_rate))
+
+    def response(
+        self, change: StanceChange, rows: Float[np.ndarray, "p r m"] | None = None
+    ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
+        """As of `StaticEquilibrium`, with the pressing limits held and the touching ones ignored.
+
+        Args:
+            change: of posture, load, contact frames and masses.
+            rows: how the rows A of the limits change besides (p, r, m), as with a coefficient of
+                friction; in the order of `names`.
+        """
         held = np.flatnonzero(self._problem.strong)
-        solved = self._problem.differentiate(self, directions, held, load_rate)
+        solved = self._problem.differentiate(self, change, held, rows)
         return solved[0], solved[1]
 
     def pressing_after(self, direction: Float[np.ndarray, " nv"]) -> Int[np.ndarray, " a"]:
@@ -273,8 +286,9 @@ def distance_to_change(
         problem.check_followed(pressing, np.where(pressed, multipliers, 0.0))
     found = problem.equilibrium(limits, optimum.x, optimum.equality, multipliers, slack)
     held = np.flatnonzero(multipliers)
-    _, _, _, bound = problem.rates_of_data(found, tangent[:, None])
-    df, _, dl = problem.differentiate(found, tangent[:, None], held)
+    along = StanceChange(tangent[:, None])
+    _, _, _, bound = problem.rates_of_data(found, along)
+    df, _, dl = problem.differentiate(found, along, held)
     distance = slack / (problem.weight * problem.scale)
     rate = (bound - problem.A.dot(df))[:, 0] / (problem.weight * problem.scale)
     distance[pressing] = (multipliers * problem.scale)[pressing] / gradient
@@ -392,52 +406,58 @@ class _Problem:
     def differentiate(
         self,
         at: ConstrainedEquilibrium,
-        V: Float[np.ndarray, "nv p"],
+        change: StanceChange,
         held: np.ndarray,
-        load_rate: np.ndarray | None = None,
+        rows: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """d f, d tau and d l of the held rows along V, with these rows held."""
-        base, joints, change, bound = self.rates_of_data(at, V, load_rate)
+        """d f, d tau and d l of the held rows as the stance changes, with these rows held."""
+        base, joints, cost, bound = self.rates_of_data(at, change, rows)
         if self.tie is None:
-            df, _, dl = self.program.hold(held, change, base, bound[held])
+            df, _, dl = self.program.hold(held, cost, base, bound[held])
         else:
-            df, _, dl = self.tie.hold(held, change, base, bound[held])
-            df = df + self.tie.choose(held, self._second_change(at, V, held, joints, df))
+            df, _, dl = self.tie.hold(held, cost, base, bound[held])
+            second = self._second_change(at, change, held, joints, df, rows)
+            df = df + self.tie.choose(held, second)
         return df, joints - self.load.joint_map.dot(df), dl
 
     def rates_of_data(
-        self, at: ConstrainedEquilibrium, V: np.ndarray, load_rate: np.ndarray | None = None
+        self, at: ConstrainedEquilibrium, change: StanceChange, rows: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """How the QP's data change along V at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
+        """How the QP's data change at fixed f and l: d(G - J'f), dg - dH f, d(b - A f).
 
         The first in two parts, base and joints; the second with the multipliers' part.
         """
-        AV = self.stance.load_change(at.forces, V, load_rate)
-        base, joints = AV[: self.nb], AV[self.nb :]
+        load = change.balance(self.stance, at.forces)
+        base, joints = load[: self.nb], load[self.nb :]
         weighted = self.W.dot(joints)
         if self.quadratic.inertia:
-            weighted = weighted + self.quadratic.torque_weight_derivative(
-                self.stance, self.load, at.torques
-            ).dot(V)
-        change = self.stance.motion_derivative(at.multipliers).dot(V)
-        change += self.load.joint_map.T.dot(weighted)
-        bound = np.zeros((len(self.b), V.shape[1]))
+            weighted = weighted + self.quadratic.torque_weight_change(
+                self.stance, self.load, at.torques, change
+            )
+        cost = change.constraint(self.stance, at.multipliers)
+        cost += self.load.joint_map.T.dot(weighted)
+        bound = np.zeros((len(self.b), load.shape[1]))
         torque = self.joint >= 0
         bound[torque] = -self.sign[torque, None] * joints[self.joint[torque]]
-        return base, joints, change, bound
+        if rows is not None:
+            cost -= np.einsum("prm,r->mp", rows, at.row_multipliers)
+            bound -= np.einsum("prm,m->rp", rows, at.forces)
+        return base, joints, cost, bound
 
     def _second_change(
         self,
         at: ConstrainedEquilibrium,
-        V: np.ndarray,
+        change: StanceChange,
         held: np.ndarray,
         joints: np.ndarray,
         df: np.ndarray,
+        rows: np.ndarray | None = None,
     ) -> np.ndarray:
-        """How the tie-break's gradient changes along V, what its multipliers take up left out.
+        """How the tie-break's gradient changes, what its multipliers take up left out.
 
-        At the optimum H2 f - g2 = E w - H y - A_a' l for some w, y, l. That stays so along V, and
-        F_a' [E  H  A_a'] = 0 removes the unknown derivatives of these; as `kkt.TieBreak` does it.
+        At the optimum H2 f - g2 = E w - H y - A_a' l for some w, y, l. That stays so as the stance
+        changes, and F_a' [E  H  A_a'] = 0 removes the unknown derivatives of these; as
+        `kkt.TieBreak` does it.
         """
         tie, robot = self.tie, self.stance.robot
         assert tie is not None
@@ -451,9 +471,11 @@ class _Problem:
         torque = self.joint[held] >= 0
         on = held[torque]
         np.add.at(turn, self.nb + self.joint[on], -self.sign[on] * l[torque])
-        change = self.stance.motion_derivative(robot.from_drives(turn)).dot(V)
-        change -= self.load.joint_map.T.dot(W2.dot(joints))
-        return np.asarray(change + tie.H.dot(df))
+        moved = change.constraint(self.stance, robot.from_drives(turn))
+        moved -= self.load.joint_map.T.dot(W2.dot(joints))
+        if rows is not None:
+            moved += np.einsum("prm,r->mp", rows[:, held], l)
+        return np.asarray(moved + tie.H.dot(df))
 
     def _adjoint(
         self, held: np.ndarray, pull: np.ndarray, still: np.ndarray
@@ -467,7 +489,8 @@ class _Problem:
         strong, weak = np.flatnonzero(self.strong), np.flatnonzero(self.weak)
         if self.tie is not None:
             return self._tied_rates(at, v, strong, weak)
-        base, joints, c, bound = (x[:, 0] for x in self.rates_of_data(at, v[:, None]))
+        along = StanceChange(v[:, None])
+        base, joints, c, bound = (x[:, 0] for x in self.rates_of_data(at, along))
         E = np.hstack([self.load.base_map.T, self.A[strong].T])
         e = np.concatenate([base, bound[strong]])
         pressed = self.program.hold(strong, c, base, bound[strong])[0]
@@ -501,11 +524,12 @@ class _Problem:
                 f"the wrenches go ({', '.join(self.names[i] for i in weak)}). Move a little along "
                 "the path."
             )
-        df, torques, dl = (x[:, 0] for x in self.differentiate(at, v[:, None], strong))
+        along = StanceChange(v[:, None])
+        df, torques, dl = (x[:, 0] for x in self.differentiate(at, along, strong))
         multipliers = np.zeros(len(self.b))
         multipliers[strong] = dl
         multipliers[self.tied] = 0.0
-        bound = self.rates_of_data(at, v[:, None])[3][:, 0]
+        bound = self.rates_of_data(at, along)[3][:, 0]
         slack = bound - self.A.dot(df)
         slack[strong] = 0.0
         return Rates(df, torques, multipliers, slack)

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from copsense import rigid_body
 from copsense.arrays import array_property, finite_array, owned
+from copsense.changes import StanceChange
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UnbalancedError
 from copsense.load_problem import LoadProblem
@@ -145,18 +146,39 @@ class StaticEquilibrium:
             InvalidInputError: a direction moves a contact.
             UndeterminedWrenchError: the rank of the contacts changes at this very posture.
         """
-        if not isinstance(self.criterion, Criterion):
-            raise InvalidInputError(
-                "a policy has no analytic derivative. Use cop_sensitivity, which differentiates it "
-                "numerically."
-            )
         if directions is not self.stance.admissible_motions:
             nv, columns = self.stance.robot.model.nv, "columns with J V = 0"
             directions = finite_array(directions, "the directions", (nv, None), columns)
             if not is_admissible(self.stance, directions):
                 raise InvalidInputError(f"a direction moves a contact. {PROJECT}")
+        return self.response(StanceChange(directions, load_rate))
+
+    def response(
+        self, change: StanceChange, rows: Float[np.ndarray, "p r m"] | None = None
+    ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
+        """How forces and torques change as the stance does, exact to first order.
+
+        Args:
+            change: of posture, load, contact frames and masses, one way per column. Directions
+                that move a contact are those of ground that moves.
+            rows: how the rows A of the limits change, A f <= b; none here, see
+                `ConstrainedEquilibrium`.
+
+        Returns:
+            d forces (m, p) and d torques (n, p); forces in contact axes, about the contact frames
+            where they come to lie.
+
+        Raises:
+            InvalidInputError: the equilibrium is that of a policy.
+            UndeterminedWrenchError: the rank of the contacts changes at this very posture.
+        """
+        if not isinstance(self.criterion, Criterion):
+            raise InvalidInputError(
+                "a policy has no analytic derivative. Use cop_sensitivity, which differentiates it "
+                "numerically."
+            )
         system = self._system or Kkt(self.stance, self.criterion)
-        return system.derivative(self, directions, load_rate)
+        return system.derivative(self, change)
 
     @property
     def _loads(self) -> Iterable[tuple[str, float]]:

@@ -5,8 +5,9 @@ With nu the multiplier of the statics, nu_j = W_tau tau:
     [ P   J' ] [nu]   [ G        ]        P = blkdiag(0, W_tau^-1)
     [ J  -W_f ] [ f] = [ -W_f f_ref ]     (rows of joints without a torque cost are dropped)
 
-and along an admissible V the same matrix with right-hand side [A V - dP nu; -D V], where
-A = d(G - J'f)/dq at fixed f and D = d(J nu)/dq at fixed nu.
+and as the stance changes the same matrix with right-hand side [d(G - J'f) - dP nu; -d(J nu)], the
+first at fixed f, the others at fixed nu (`StanceChange`); along an admissible V it is
+[A V - dP nu; -D V].
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from copsense.changes import StanceChange
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.freedom import missing_joints
@@ -93,19 +95,19 @@ class Kkt:
     def derivative(
         self,
         at: StaticEquilibrium,
-        V: Float[np.ndarray, "nv p"],
-        load_rate: Float[np.ndarray, "nv p"] | None = None,
+        change: StanceChange,
     ) -> tuple[Float[np.ndarray, "m p"], Float[np.ndarray, "n p"]]:
-        """Derivatives of forces and torques along admissible velocities V, see its caller."""
+        """Derivatives of forces and torques as the stance changes, see its callers."""
         stance = self.stance
-        AV = stance.load_change(at.forces, V, load_rate)
-        right = np.empty((self.size + len(self.free), V.shape[1]))
-        right[: self.size] = AV[self.on]
+        load = change.balance(stance, at.forces)
+        right = np.empty((self.size + len(self.free), load.shape[1]))
+        right[: self.size] = load[self.on]
         if self.quadratic.inertia:
             nu = stance.robot.in_drives(at.multipliers)
-            change = self.quadratic.compliance_derivative(stance, self.problem, nu)
-            right[self.nb : self.size] -= change @ V
-        right[self.size :] = -stance.motion_derivative(at.multipliers).dot(V)
+            right[self.nb : self.size] -= self.quadratic.compliance_change(
+                stance, self.problem, nu, change
+            )
+        right[self.size :] = -change.constraint(stance, at.multipliers)
         dx = self.system.solve(right)
         if self.system.singular:
             left = np.abs(self.system.matrix @ dx - right).max(initial=0.0)
@@ -122,8 +124,8 @@ class Kkt:
                 )
         df = dx[self.size :]
         if self.tie:
-            df = df + self.tie.move_derivative(at, V, AV, df)
-        return df, AV[self.nb :] - self.problem.joint_map.dot(df)
+            df = df + self.tie.move_derivative(at, change, load, df)
+        return df, load[self.nb :] - self.problem.joint_map.dot(df)
 
     def weight_derivative(
         self,
@@ -191,12 +193,12 @@ class TieBreak:
         return self.F @ np.linalg.solve(self.curvature, self.F.T @ (g - H @ forces))
 
     def move_derivative(
-        self, at: StaticEquilibrium, V: np.ndarray, AV: np.ndarray, df: np.ndarray
+        self, at: StaticEquilibrium, change: StanceChange, load: np.ndarray, df: np.ndarray
     ) -> np.ndarray:
-        """The part F dz of the forces' derivative.
+        """The part F dz of the forces' derivative; `load` is d(N - J' f).
 
         The gradient lies in the range of the first KKT matrix K, K (w, y) = -(0, H f - g); that
-        stays so along V, and F' K = 0 removes the unknown derivative of (w, y).
+        stays so as the stance changes, and F' K = 0 removes the unknown derivative of (w, y).
         """
         first, stance, nb = self.first, self.first.stance, self.first.nb
         H, g = self.second.over_forces(first.problem)
@@ -205,12 +207,12 @@ class TieBreak:
         w = np.zeros(len(first.on))
         w[first.on] = x[: first.size]
         w[nb:] -= W @ at.torques
-        change = (
-            stance.motion_derivative(stance.robot.from_drives(w)) @ V
-            - first.problem.joint_map.T @ W @ AV[nb:]
+        moved = (
+            change.constraint(stance, stance.robot.from_drives(w))
+            - first.problem.joint_map.T @ W @ load[nb:]
             + H @ df
         )
-        return -self.F @ np.linalg.solve(self.curvature, self.F.T @ change)
+        return -self.F @ np.linalg.solve(self.curvature, self.F.T @ moved)
 
 
 def _undetermined(
