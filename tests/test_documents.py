@@ -47,6 +47,7 @@ def test_example_runs_and_its_numbers_hold(example):
         "docs/logs.md",
         "docs/maps.md",
         "docs/postures.md",
+        "docs/uncertainty.md",
     ],
 )
 def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):

@@ -76,6 +76,15 @@ CALLS = {
     "map_postures('icub', grid, [mt], 'absent/x.zarr')": NO_STANCE,
     "path_through('icub', [s.q])": NO_STANCE,
     "push_limits('icub', 'base_link')": NO_STANCE,
+    "propagate_uncertainty('icub', mt)": NO_STANCE,
+    "propagate_uncertainty(s, 'x')": NO_CRITERION,
+    "propagate_uncertainty(s, mt, 'usual')": "'usual' is not an uncertainty. Give Uncertainty(",
+    "propagate_uncertainty(s, mt, {'links': {}})": "is not an uncertainty. Give Uncertainty(",
+    "propagate_uncertainty(s, mt, limits='friction')": NO_LIMITS,
+    "analyse(s, [mt], uncertainty=0.05)": "0.05 is not an uncertainty. Give Uncertainty(",
+    "Uncertainty(links=3)": "links is 3. Write a table",
+    "Uncertainty(payloads='l_hand')": "payloads is 'l_hand'. Write a list",
+    "Uncertainty.from_dict([])": "an uncertainty is []. Write a table",
     "solve_equilibrium('icub', mt)": NO_STANCE,
     "solve_posture('icub', com=(0, 0, None))": NO_STANCE,
     "lateral_sweep(s.robot, 0, 0.1, 3)": "Make one with copsense.load_stance(...)",
@@ -209,6 +218,7 @@ from copsense.robot import Payload, Robot
 from copsense.scan import limit_travel, next_active_set_change
 from copsense.simulation import *
 from copsense.simulation.disturbance import *
+from copsense.uncertainty import *
 
 s = copsense.load_stance("solo12")
 p = copsense.lateral_sweep(s, -0.005, 0.005, 3)

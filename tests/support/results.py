@@ -9,6 +9,7 @@ import numpy as np
 
 import copsense
 from copsense.batch import BatchKernel, PostureChart
+from copsense.changes import StanceChange
 from copsense.comparison import ControllerChoice, PostureChoice, Rest, RobotChoice, make_plan
 from copsense.comparison.score import Score
 from copsense.controllers import BalancingController
@@ -43,6 +44,7 @@ from copsense.sole import read_sole
 from copsense.sway_levers import sway_levers
 from copsense.terms import PreloadTerm
 from copsense.timed_path import Sway, TimedPath
+from copsense.uncertainty import Uncertainty, propagate_uncertainty
 from support.driven_robots import everything, standing
 
 TORQUE, LENGTH = copsense.minimum_torque(), copsense.minimum_wrench(1.0)
@@ -154,6 +156,12 @@ def all_results(icub) -> dict[str, object]:
         "limit margins": margin_table(icub, LIMITS),
         "margin": icub.contacts[0].sole.margin((0.0, 0.0)),
         "analysis": copsense.analyse(bar, None, copsense.Limits()),
+        "uncertainty": Uncertainty.default(icub),
+        "change of a stance": StanceChange(
+            icub.admissible_motions, np.zeros(icub.admissible_motions.shape)
+        ),
+        "spread": propagate_uncertainty(icub, TORQUE, samples=1),
+        "analysis with an uncertainty": copsense.analyse(bar, [TORQUE], uncertainty="default"),
         "regions": copsense.com_regions(icub, [LENGTH], LIMITS, tolerance=1e-2),
         "inspection": inspect_robot(copsense.load_robot("solo12")),
         "pushes": push_limits(icub, "chest", [LENGTH], LIMITS),

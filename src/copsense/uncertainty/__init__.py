@@ -1,0 +1,24 @@
+"""Uncertainty: what a model's errors make of wrenches, centres of pressure, margins and travels.
+
+`Uncertainty` says how far masses, joints, contacts and the ground may be off;
+`propagate_uncertainty` what follows, exact to first order, and how far that carries.
+"""
+
+from copsense.uncertainty.perturbation import perturbed, perturbed_limits
+from copsense.uncertainty.propagation import Spread, propagate_uncertainty, sample_models
+from copsense.uncertainty.robust_travel import RobustTravel
+from copsense.uncertainty.source import Source
+from copsense.uncertainty.source_list import sources_of
+from copsense.uncertainty.uncertainty_tables import Uncertainty
+
+__all__ = [
+    "RobustTravel",
+    "Source",
+    "Spread",
+    "Uncertainty",
+    "perturbed",
+    "perturbed_limits",
+    "propagate_uncertainty",
+    "sample_models",
+    "sources_of",
+]
