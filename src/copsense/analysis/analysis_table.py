@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from copsense.analysis.limit_lines import clipped, limit_lines
+from copsense.analysis.spread_lines import spread_lines
 from copsense.analysis.sway_lines import sway_lines
 from copsense.extras import require
 
@@ -43,7 +44,7 @@ def text(data: dict[str, Any], joint_unit: Unit) -> str:
                 for column, word, width in zip(columns, line, widths, strict=True)
             ]
             lines.append(f"  {'  '.join(padded)}".rstrip())
-        lines += [f"  {line}" for line in (*limit_lines(row), *sway_lines(row))]
+        lines += [f"  {line}" for line in _below(row)]
     return "\n".join([*lines, "", data["verdict"]])
 
 
@@ -57,7 +58,7 @@ def html(data: dict[str, Any], joint_unit: Unit) -> str:
             f"<tr>{''.join(f'<td>{markup.escape(word)}</td>' for word in line)}</tr>"
             for line in cells
         )
-        below = "<br>".join(map(markup.escape, (*limit_lines(row), *sway_lines(row))))
+        below = "<br>".join(map(markup.escape, _below(row)))
         parts.append(
             f"<table><caption>{markup.escape(_title(name, row))}</caption><thead><tr>{head}</tr>"
             f"</thead><tbody>{body}</tbody></table>" + (f"<p>{below}</p>" if below else "")
@@ -89,6 +90,11 @@ def table(data: dict[str, Any]) -> pd.DataFrame:
                     row[name] = value
             rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _below(row: dict[str, Any]) -> tuple[str, ...]:
+    """What stands under the table of one criterion."""
+    return (*limit_lines(row), *sway_lines(row), *spread_lines(row))
 
 
 def _heading(data: dict[str, Any]) -> Iterator[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -31,6 +31,7 @@ from copsense.statics import (
     named_criteria,
 )
 from copsense.sway_levers import SwayLever, sway_levers
+from copsense.uncertainty import Spread, Uncertainty, propagate_uncertainty
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +59,8 @@ class Analysis:
         period: of the sway asked about [s]; None for none.
         sway: criterion's name -> what a sway about this posture does to its outputs; without
             policies, and empty without a period.
+        spreads: criterion's name -> what errors of the model make of its answer; empty without an
+            uncertainty.
     """
 
     stance: Stance
@@ -70,10 +73,11 @@ class Analysis:
     checked: bool
     period: float | None = None
     sway: Mapping[str, tuple[SwayLever, ...]] = field(default_factory=dict)
+    spreads: Mapping[str, Spread] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Own the tangent and the mappings."""
-        freeze(self, "tangent", "sensitivities", "limit_analyses", "sway")
+        freeze(self, "tangent", "sensitivities", "limit_analyses", "sway", "spreads")
 
     @property
     def equilibria(self) -> dict[str, StaticEquilibrium]:
@@ -99,10 +103,14 @@ class Analysis:
         return table(self._data)
 
     def plot(self) -> Figure:
-        """The robot, and each criterion from above, `copsense.plots.plot_stance`."""
+        """The robot, and each criterion from above, `copsense.plots.plot_stance`.
+
+        With the ellipses of the centres of pressure where there is an uncertainty.
+        """
         from copsense.plots import plot_stance
 
-        return plot_stance(self.stance, list(self.sensitivities.values()))
+        spreads = [self.spreads[name] for name in self.sensitivities] if self.spreads else None
+        return plot_stance(self.stance, list(self.sensitivities.values()), spreads)
 
     def __str__(self) -> str:
         """The table, without the notes."""
@@ -166,6 +174,8 @@ class Analysis:
         }
         if name in self.limit_analyses:
             row |= self.limit_analyses[name].to_dict()
+        if name in self.spreads:
+            row["uncertainty"] = self.spreads[name].to_dict()
         if self.period is not None and name in self.sway:
             row["sway"] = {
                 "period": self.period,
@@ -226,6 +236,7 @@ def analyse(
     at: Mapping[str, float] | None = None,
     check: bool = False,
     period: float | None = None,
+    uncertainty: Uncertainty | Literal["default"] | None = None,
 ) -> Analysis:
     """Analyse one posture: centre of pressure, margin and sensitivity of every contact.
 
@@ -247,6 +258,10 @@ def analyse(
         check: compare the derivatives with finite differences.
         period: of a sideways sway of the CoM about this posture [s]: `Analysis.sway` then says of
             each output what it does to the slope, and up to which frequency statics are within 5 %.
+        uncertainty: how far the model may be off, such as
+            ``copsense.uncertainty.Uncertainty.read(path)``; ``"default"`` for what is usual.
+            `Analysis.spreads` then says what that makes of the answer. The criteria must be
+            `Criterion` values.
 
     Raises:
         InvalidInputError: not a stance, or criteria without distinct names.
@@ -269,9 +284,8 @@ def analyse(
         for criterion in chosen.values():
             if isinstance(criterion, Criterion):  # a policy's are finite differences themselves
                 check_sensitivity(here, criterion, within)
-    limited = {}
+    limited, path = {}, LateralPath(here)  # its postures serve every criterion
     if within is not None:
-        path = LateralPath(here)  # its postures serve every criterion
         for name, criterion in chosen.items():
             assert isinstance(criterion, Criterion)  # cop_sensitivity rejects a policy with limits
             limited[name] = analyse_limits(path, criterion, within, found[name], tangent)
@@ -282,6 +296,11 @@ def analyse(
         for name, each in found.items()
         if period is not None and isinstance(each.equilibrium.criterion, Criterion)
     }
+    spreads = {
+        name: propagate_uncertainty(here, criterion, uncertainty, within, path=path)
+        for name, criterion in chosen.items()
+        if uncertainty is not None
+    }
     notes = (
         *here.robot.notes,
         *tied,
@@ -290,8 +309,11 @@ def analyse(
         *plausibility_notes(here),
         *sole_notes(here),
         *joint_limit_notes(here),
+        *(f"{name}: {note}" for name, spread in spreads.items() for note in spread.notes),
     )
-    return Analysis(here, tangent, found, within, limited, along, notes, check, period, swayed)
+    return Analysis(
+        here, tangent, found, within, limited, along, notes, check, period, swayed, spreads
+    )
 
 
 def _limit_notes(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -15,12 +15,16 @@ from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
 
+if TYPE_CHECKING:
+    from copsense.uncertainty import Uncertainty
+
 
 @click.command(
     epilog="\b\nExamples:\n"
     "  copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png\n"
     "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
     "  copsense analyse icub --period 2s\n"
+    "  copsense analyse icub --uncertainty default --plot icub.png\n"
     "  copsense analyse icub --at com_y=30mm --at pitch=2deg --at l_sole:x=20mm\n"
     "  copsense analyse icub --load l_hand=0:0:-20 --spring-load r_hand=500:0:500:0.2:-0.3:0.6\n"
     "  copsense analyse icub --com-y 0.03 --payload l_hand=2 --save-stance carrying.toml\n"
@@ -41,6 +45,12 @@ from copsense.errors import InvalidInputError
     help="Say what a sideways sway of this period does to loads and centres of pressure, and up to "
     "which frequency statics are within 5 %.",
 )
+@click.option(
+    "--uncertainty",
+    metavar="FILE",
+    help="Say what errors of the model make of the answer: a file (.toml) of standard deviations, "
+    "or 'default' for what a careful laboratory knows of its robot.",
+)
 @click.option("--check", is_flag=True, help="Compare the derivatives with finite differences.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw the stance: .png, .svg or .pdf.")
 @click.option(
@@ -58,6 +68,7 @@ def analyse(
     limits: str | None,
     along: str | None,
     period: float | None,
+    uncertainty: str | None,
     check: bool,
     picture: str | None,
     regions: str | None,
@@ -85,8 +96,11 @@ def analyse(
             "--limits friction=0.33,torque=model."
         )
     chosen = read_criteria(criteria, characteristic_length)
+    unsure = read_uncertainty(uncertainty)
     stance = read_stance(robot, **options)
-    analysis = analyse_stance(stance, chosen, within, along, check=check, period=period)
+    analysis = analyse_stance(
+        stance, chosen, within, along, check=check, period=period, uncertainty=unsure
+    )
     answer = analysis.to_dict()
     if regions is not None:
         assert within is not None
@@ -108,3 +122,12 @@ def analyse(
         for line in region_lines(answer["regions"]["of"]):
             click.echo(line)
     echo_written(regions, picture)
+
+
+def read_uncertainty(text: str | None) -> Uncertainty | Literal["default"] | None:
+    """``--uncertainty``: a file, or the word ``default``."""
+    from copsense.uncertainty import Uncertainty
+
+    if text is None or text == "default":
+        return text  # type: ignore[return-value]
+    return Uncertainty.read(text)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,9 +30,12 @@ from copsense.plots.style import (
 from copsense.sensitivity import CopSensitivity
 from copsense.skeleton import skeleton
 from copsense.stance import Stance
+from copsense.uncertainty import Spread
 
 _STEP = 20.0  # mm that the CoM moves for the arrows
 _FLATTEST = 0.6  # height of what is drawn from above, by its width
+_UNSEEN = 0.1  # mm: smaller is nothing to see
+_WORST: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 2))}
 _FORWARD, _LEFT = "#009E73", "#CC79A7"
 
 
@@ -38,6 +43,7 @@ _FORWARD, _LEFT = "#009E73", "#CC79A7"
 def plot_stance(
     stance: Stance,
     sensitivities: Sequence[CopSensitivity],
+    spreads: Sequence[Spread] | None = None,
     *,
     axes: Panels | None = None,
     label: str | None = None,
@@ -52,6 +58,8 @@ def plot_stance(
     Args:
         stance: the stance.
         sensitivities: of that stance, one per criterion, at least one.
+        spreads: what errors of the model make of each (`copsense.uncertainty`), in the same order:
+            then the ellipse round each CoP and the outline of its worst case are drawn too.
         axes: where to draw the criteria from above, one for each, without the robot (`plot_robot`
             draws it) and without a legend; default a new figure of both.
         label: what the titles say, before the criterion's name where there are several.
@@ -59,12 +67,17 @@ def plot_stance(
 
     Raises:
         InvalidInputError: there is no sensitivity, or one has another number of contacts; other
-            than one of `axes` for each.
+            than one of `spreads` or `axes` for each.
     """
     if not sensitivities or any(len(s.cop) != len(stance.contacts) for s in sensitivities):
         raise InvalidInputError(
             "plot_stance needs sensitivities of the stance it draws, one per criterion: "
             "[cop_sensitivity(stance, criterion), ...]."
+        )
+    if spreads is not None and len(spreads) != len(sensitivities):
+        raise InvalidInputError(
+            f"there are {len(spreads)} spreads for {len(sensitivities)} sensitivities. Give one of "
+            "each criterion, or none."
         )
     places = stance.placements
     origins = np.array([place.translation[:2] for place in places]) * MM
@@ -79,15 +92,19 @@ def plot_stance(
     look = looks(names, color, label)
     colour = look.colour
     if axes is None:
-        figure, panels = _with_robot(stance, sensitivities, colour)
+        figure, panels = _with_robot(stance, sensitivities, colour, _handles(spreads))
     else:
         panels = given_axes(axes, names)
         figure = whole_figure(panels[0])
     turned = [place.rotation[:2, :2] for place in places]
-    drawn = [_Drawn(s, origins, turned) for s in sensitivities]
+    drawn = [
+        _Drawn(s, origins, turned, spread)
+        for s, spread in zip_longest(sensitivities, spreads or ())
+    ]
     reach = np.vstack([com, *[d.points() for d in drawn]])
     for ax, result, name in zip(panels, drawn, names, strict=True):
         draw_ground(ax, soles, origins)
+        _draw_spreads(ax, result, colour[name])
         _draw_arrows(ax, result, colour[name])
         ax.plot(com[1], com[0], "+", color=INK, markersize=13, markeredgewidth=2, zorder=6)
         frame_ground(ax, soles, origins, reach)
@@ -99,7 +116,10 @@ def plot_stance(
 
 
 def _with_robot(
-    stance: Stance, sensitivities: Sequence[CopSensitivity], colour: Mapping[str, str]
+    stance: Stance,
+    sensitivities: Sequence[CopSensitivity],
+    colour: Mapping[str, str],
+    handles: list[Line2D],
 ) -> tuple[Figure, list[Axes]]:
     """A figure with the robot on its left; the panels that are still to be drawn."""
     across, along, height = np.ptp(skeleton(stance).reshape(-1, 3), axis=0)
@@ -116,7 +136,8 @@ def _with_robot(
     above: list[Axes] = []
     for column in range(len(robot), len(widths)):
         above.append(figure.add_subplot(grid[:, column], sharey=above[0] if above else None))
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=5)
+    columns = 5 if len(handles) == 5 else 4
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns)
     return figure, above
 
 
@@ -124,7 +145,11 @@ class _Drawn:
     """A sensitivity laid out in the world [mm]."""
 
     def __init__(
-        self, result: CopSensitivity, origins: np.ndarray, axes: Sequence[np.ndarray]
+        self,
+        result: CopSensitivity,
+        origins: np.ndarray,
+        axes: Sequence[np.ndarray],
+        spread: Spread | None = None,
     ) -> None:
         self.result = result
         turned = [r @ p * MM for r, p in zip(axes, result.cop, strict=True)]
@@ -132,10 +157,27 @@ class _Drawn:
         self.moves = np.array(
             [r @ gain * _STEP for r, gain in zip(axes, result.com_gain, strict=True)]
         )  # (nc, 2, 2): columns for the CoM forward and to the left
+        around = () if spread is None else (spread.outlines, spread.worst_outlines)
+        self.ellipses, self.worst = (
+            [o + p @ r.T * MM for o, r, p in zip(origins, axes, outlines, strict=False)]
+            for outlines in around or ((), ())
+        )
 
     def points(self) -> np.ndarray:
         """The places where something is drawn (k, 2) [mm]."""
-        return np.vstack([self.cops, *(self.cops + self.moves[:, :, j] for j in (0, 1))])
+        moved = (self.cops + self.moves[:, :, j] for j in (0, 1))
+        return np.vstack([self.cops, *moved, *self.worst])
+
+
+def _draw_spreads(ax: Axes, drawn: _Drawn, colour: str) -> None:
+    """The ellipse of each CoP, and round it the outline of its worst case."""
+    for ellipse, worst in zip(drawn.ellipses, drawn.worst, strict=True):
+        if np.ptp(ellipse, axis=0).max() < _UNSEEN:
+            continue  # a point contact's does not move
+        ax.fill(ellipse[:, 1], ellipse[:, 0], color=colour, alpha=0.25, linewidth=0, zorder=2)
+        ax.plot(ellipse[:, 1], ellipse[:, 0], color=colour, linewidth=1.2, zorder=2.1)
+        closed = np.vstack([worst, worst[:1]])
+        ax.plot(closed[:, 1], closed[:, 0], color=colour, **_WORST, zorder=2.1)
 
 
 def _draw_arrows(ax: Axes, drawn: _Drawn, dot: str) -> None:
@@ -210,14 +252,22 @@ def _length(travel: float) -> str:
     return f"{travel:.1f} m" if travel >= 1.0 else f"{travel * MM:.0f} mm"
 
 
-def _handles() -> list[Line2D]:
+def _handles(spreads: Sequence[Spread] | None) -> list[Line2D]:
     def arrow(colour: str, words: str) -> Line2D:
         return Line2D([], [], color=colour, linewidth=2.0, marker=9, markersize=7, label=words)
 
+    unsure = []
+    if spreads:
+        words = f"{spreads[0].sigmas:g} standard deviations of the CoP"
+        unsure = [
+            Line2D([], [], color=MUTED, linewidth=1.2, label=words),
+            Line2D([], [], color=MUTED, label="its worst case", **_WORST),
+        ]
     return [
         Line2D([], [], color=MUTED, marker="o", linestyle="none", label="CoP"),
         Line2D([], [], color=INK, marker="+", markersize=11, linestyle="none", label="CoM"),
         Line2D([], [], label="CoM on the ground", **RING),
         arrow(_FORWARD, f"CoP if the CoM goes {_STEP:.0f} mm forward"),
         arrow(_LEFT, f"{_STEP:.0f} mm to the left"),
+        *unsure,
     ]
