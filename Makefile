@@ -51,8 +51,9 @@ pytest: $(DEV_STAMP) ## the tests alone
 	$(BIN)/pytest $(PYTEST_ARGS)
 
 .PHONY: lint
-lint: $(DEV_STAMP) ## mistakes and style
+lint: $(DEV_STAMP) ## mistakes, style and spelling
 	$(BIN)/ruff check
+	$(BIN)/typos
 
 .PHONY: format
 format: $(DEV_STAMP) ## formatting (checked, nothing is changed)
@@ -81,6 +82,16 @@ docs: $(DEV_STAMP) ## build the documentation into build/docs; a warning is an e
 	    --doctree-dir build/doctrees --builder html docs build/docs
 	@echo "build/docs/index.html"
 
+.PHONY: package
+package: $(DEV_STAMP) ## build sdist and wheel into dist; try them and the repository as a release
+	@$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --group release
+	$(BIN)/repo-review .
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.dependabot .github/dependabot.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
+	$(BIN)/zizmor --offline --quiet .github
+	$(BIN)/python tools/try_wheel.py
+
 .PHONY: venv
 venv: $(DEV_STAMP) ## set .venv up for development
 
@@ -103,7 +114,9 @@ $(RUN_STAMP): pyproject.toml
 $(DEV_STAMP): pyproject.toml
 	@$(MAKE) --no-print-directory ensure-venv
 	@echo "Installing copsense with its development tools into $(VENV) ..."
-	@$(PIP_INSTALL) '.[dev]'
+	@# The pip of an older Python knows no dependency groups.
+	@$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check 'pip>=25.1'
+	@$(PIP_INSTALL) '.[all]' --group dev
 	@touch $(RUN_STAMP) $@
 
 # Keeps an environment that works. Otherwise makes one with the first interpreter that can;
