@@ -9,16 +9,10 @@ from pathlib import Path
 
 import pytest
 from support.commands import copsense
-
-from copsense import __version__
+from support.fences import blocks, commands
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-
-
-def blocks(page: Path, language: str) -> list[str]:
-    return [code for name, code in FENCE.findall(page.read_text("utf-8")) if name == language]
 
 
 def test_every_class_says_what_it_is():
@@ -59,14 +53,11 @@ def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
 
 def test_commands_of_the_readme_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    commands = [
-        line.removeprefix("$ ")
-        for block in blocks(ROOT / "README.md", "console")
-        for line in block.splitlines()
-        if line.startswith("$ copsense") and "reproduce" not in line  # has a test of its own
+    lines = [
+        line for line in commands(ROOT / "README.md", "console") if line.startswith("copsense")
     ]
-    assert commands
-    for command in commands:
+    assert lines
+    for command in lines:
         done = copsense(*shlex.split(command)[1:])
         assert done.code == 0, f"{command}\n{done.err}"
 
@@ -89,8 +80,3 @@ def test_names_that_changed_lead_to_names_of_today():
         except (ImportError, AttributeError):
             missing.append(name)
     assert not missing
-
-
-def test_citation_gives_the_version():
-    citation = (ROOT / "CITATION.cff").read_text("utf-8")
-    assert f"\nversion: {__version__}\n" in citation

@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import pytest
-
 ROOT = Path(__file__).resolve().parents[2]
 PLACES = [folder / "shared" / "data" for folder in (ROOT, *ROOT.parents[:2])]
 
@@ -13,4 +11,6 @@ def public_log():
     for place in PLACES:
         if (place / "com-sinusoid.mat").is_file():
             return place / "com-sinusoid.mat", place / "icub-genova04-2021.urdf"
+    import pytest
+
     return pytest.skip("com-sinusoid.mat is not in shared/data; docs/logs.md says where to get it")
