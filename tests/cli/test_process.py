@@ -130,3 +130,19 @@ def test_a_reader_that_leaves_early_is_no_error():
         os.close(writing)
     assert done.returncode == 0
     assert "Traceback" not in done.stderr
+
+
+def test_a_library_that_the_system_lacks_is_one_line():
+    code = (
+        "import sys, importlib.abc\n"
+        "class Lacking(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        "        if name == 'pinocchio':\n"
+        "            raise ImportError('libgomp.so.1: cannot open shared object file')\n"
+        "sys.meta_path.insert(0, Lacking())\n" + ENTRY
+    )
+    done = run("analyse", "icub", code=code)
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: a package that copsense needs cannot be loaded: libgomp")
+    assert "apt install libgomp1" in done.stderr
+    assert done.stderr.count("\n") == 1

@@ -76,6 +76,8 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("stopped; nothing half-written is left behind.", err=True)
         sys.exit(130)
+    except ImportError as error:
+        click.echo(f"error: {_unloadable(error)}", err=True)
     except BrokenPipeError:
         sys.stderr.close()  # the reader of our output has seen enough
         sys.exit(0)
@@ -90,6 +92,15 @@ def _run() -> int:
         return copsense.main(standalone_mode=False) or 0
     except SystemExit:
         return 0  # click leaves so when the reader of our output has seen enough
+
+
+def _unloadable(error: ImportError) -> str:
+    """What is missing when a package that copsense needs is there and cannot be loaded."""
+    remedy = "Install it anew: pip install --force-reinstall copsense."
+    if ".so" in str(error):
+        # Pinocchio's wheels take OpenMP from the system, which slim containers leave out.
+        remedy = "Install that library of the system (libgomp on Debian: apt install libgomp1)."
+    return f"a package that copsense needs cannot be loaded: {error}. {remedy}"
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

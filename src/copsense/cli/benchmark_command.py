@@ -18,6 +18,7 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.option_lists import F
 from copsense.cli.place_options import place_options
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
+from copsense.cli.robot_argument import robot_argument
 from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.stance_options import read_stance, standing_options
 from copsense.cli.units import Unit, read_quantity
@@ -58,7 +59,7 @@ def _standing_options(command: F) -> F:
     "  copsense benchmark --stance carrying.toml --disturbance push\n"
     "  copsense benchmark --plan plan.toml --output table.csv"
 )
-@click.argument("robots", nargs=-1, metavar="[ROBOT]...")
+@robot_argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--plan", "plan_file", type=click.Path(), help="Take the cases from a TOML file.")
 @criterion_options
 @click.option(

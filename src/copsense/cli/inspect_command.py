@@ -10,6 +10,7 @@ from copsense.cli.contact_options import contact_options, possible_frames, read_
 from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.option_lists import package_dirs_option
 from copsense.cli.printing import echo_json
+from copsense.cli.robot_argument import robot_argument
 from copsense.cli.stance_options import place_at_height
 from copsense.errors import InvalidInputError
 
@@ -21,7 +22,7 @@ from copsense.errors import InvalidInputError
     "  copsense inspect robot.urdf --passive l_ankle --loop l_rod_end=l_heel\n"
     "  copsense inspect robot.urdf --contact l_toe:point --contact r_toe:point"
 )
-@click.argument("robot")
+@robot_argument()
 @package_dirs_option
 @click.option("--root", metavar="BODY", help="Body of the robot, where an MJCF holds several.")
 @contact_options

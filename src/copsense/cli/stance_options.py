@@ -15,6 +15,7 @@ from copsense.cli.load_options import load_options, put_loads
 from copsense.cli.option_lists import F, package_dirs_option, with_options
 from copsense.cli.place_options import course_options, place_options, put_in_place
 from copsense.cli.printing import echo_notes
+from copsense.cli.robot_argument import robot_argument
 from copsense.cli.stance_memory import remember_stance, remembered_stance, written
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError
@@ -31,12 +32,12 @@ def stance_options(command: F, *, coordinates: bool = True) -> F:
         coordinates: whether it takes ``--at`` of `place_options`.
     """
     placed = place_options(command, coordinates=coordinates)
-    return click.argument("robot", required=False)(standing_options(placed))
+    return robot_argument(required=False)(standing_options(placed))
 
 
 def swept_stance_options(command: F) -> F:
     """The same for a command that sweeps the CoM or a joint: a value holds, a range sweeps."""
-    return click.argument("robot", required=False)(standing_options(course_options(command)))
+    return robot_argument(required=False)(standing_options(course_options(command)))
 
 
 _POSTURE = click.option(
