@@ -5,12 +5,17 @@ in the robot's order; frame Jacobians in the frame's axes, linear rows first. Jo
 has locked are locked at zero here too.
 """
 
+import sys
 import xml.etree.ElementTree as ET
 
-import idyntree.bindings as idyn
 import mujoco
 import numpy as np
 import pinocchio as pin
+import pytest
+
+if sys.version_info >= (3, 14):
+    pytest.importorskip("idyntree", reason="iDynTree has no wheel for this Python yet")
+import idyntree.bindings as idyn
 
 
 def _skeleton(robot):
