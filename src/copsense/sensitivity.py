@@ -356,8 +356,8 @@ def check_sensitivity(
         criterion: the criterion to differentiate.
         limits: what it must respect; the active ones must be the same at every difference.
         tolerance: largest difference allowed, relative to the largest entry of each.
-        step: displacement of the differences [rad, m]; a tenth and a hundredth of it are tried where
-            they differ.
+        step: displacement of the differences [rad, m]; a tenth and a hundredth of it are tried
+            where they differ.
 
     Raises:
         SensitivityMismatchError: they differ by more; the message says where and by how much, and
