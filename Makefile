@@ -108,7 +108,7 @@ PIP_INSTALL = $(BIN)/python -m pip install --quiet --quiet --disable-pip-version
 $(RUN_STAMP): pyproject.toml
 	@$(MAKE) --no-print-directory ensure-venv
 	@echo "Installing copsense and the robot models into $(VENV) ..."
-	@$(PIP_INSTALL) '.[fast,report,sim]'
+	@$(PIP_INSTALL) '.[explore,fast,report,sim]'
 	@touch $@
 
 $(DEV_STAMP): pyproject.toml

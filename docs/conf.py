@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging as standard_logging
 import os
 import re
 from importlib.metadata import version as installed_version
@@ -15,6 +16,7 @@ from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 
 os.environ["MPLBACKEND"] = "agg"
+standard_logging.getLogger("websockets").setLevel("WARNING")  # of pages in 3-D
 
 logger = logging.getLogger(__name__)
 
@@ -57,7 +59,7 @@ nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),
     # The parts of a type such as Float[np.ndarray, "nc 6"] or tuple[float, ...].
     (r"py:.*", r"ArrayLike|Float|WrenchPolicy|TypeAliasForwardRef|ndarray|'[^']*'|'|tuple\[.*"),
-    (r"py:.*", r"Figure|Path"),  # imported for type checkers alone
+    (r"py:.*", r"Axes|Color|Figure|Panels|Path"),  # imported for type checkers alone
     # Type variables, and a type that only its module's own code sees.
     (r"py:class", r"copsense\.paper\.claims\.verdict\.(Subject|Other)"),
     (r"py:class", r"copsense\.content\.(Key|Value)|copsense\.labelled\.R|_Problem"),
@@ -167,8 +169,21 @@ def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
             logger.warning("docs/theory.md has %d places for its %s, not one", count, name)
 
 
+def write_pages(app: Sphinx, error: Exception | None) -> None:
+    """Make the pages in 3-D that the documentation shows; megabytes that nobody commits."""
+    if error is not None or app.builder.format != "html":
+        return
+    import copsense
+
+    folder = Path(app.outdir) / "_static"
+    folder.mkdir(exist_ok=True)
+    leaning = copsense.analyse(copsense.load_stance("icub"), com_y=0.03)
+    leaning.show().save(folder / "icub-3d.html", overwrite=True)
+
+
 def setup(app: Sphinx) -> None:
-    """Register the MathML renderer and what prepares docstrings."""
+    """Register the MathML renderer and what prepares docstrings, and make pages in 3-D."""
+    app.connect("build-finished", write_pages)
     app.connect("source-read", write_tables)
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.connect("autodoc-process-signature", name_aliases)

@@ -42,3 +42,9 @@ for criterion, reach in data.planted_range.items():
 per_hip_roll = slopes / float(middle["tangent"].sel(velocity="l_hip_roll"))
 print(per_hip_roll.to_series().round(3).to_string())
 assert abs(float(per_hip_roll.sel(criterion="minimum-torque")) + 0.196) < 0.001
+
+# %%
+# The same in 3-D (``pip install "copsense[explore]"``): drag to turn it; the bar under it plays and
+# scrubs. A notebook shows it likewise, and ``.save("icub.html")`` makes a page to give on.
+
+data.show(stance)

@@ -9,6 +9,7 @@ what counts is when a foot unloads.
 import numpy as np
 
 import copsense
+from copsense.plots import plot_robot
 
 model = copsense.load_robot("solo12")
 planes = {
@@ -40,3 +41,10 @@ plane = copsense.Plane((0.0, 0.0, 0.01), (0.1, 0.0, 1.0))
 total = copsense.cop.total_center_of_pressure(equilibrium, plane)
 assert np.allclose(total, copsense.cop.com_projection(stance, plane), atol=1e-10)
 print("centre of pressure on the plane [m]:", total.round(4))
+
+# %%
+# From its right side the uneven ground is seen; each dot is the load's place on a foot.
+
+figure = plot_robot(
+    stance, [copsense.cop_sensitivity(stance, copsense.minimum_torque())], side="right"
+).figure

@@ -7,7 +7,9 @@ import runpy
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 from support.commands import copsense
 from support.fences import blocks, commands
 
@@ -49,6 +51,12 @@ def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     snippets = blocks(ROOT / page, "python")
     assert snippets
     exec(compile("\n".join(snippets), page, "exec"), {"__name__": "snippet"})
+    if page == "README.md":
+        shown, drawn = (
+            np.asarray(Image.open(at / "icub.png").convert("RGB"), dtype=float)
+            for at in (ROOT / "docs" / "images", tmp_path)
+        )
+        assert np.abs(shown - drawn).mean() < 0.1  # of 255: the picture is what the lines make
 
 
 def test_commands_of_the_readme_run(tmp_path, monkeypatch):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -36,6 +36,9 @@ from copsense.motion import Motion
 from copsense.robot import Robot
 from copsense.row_space import RowSpace
 from copsense.unheld import unheld_motions
+
+if TYPE_CHECKING:
+    from copsense.explore.showing import ShownPage
 
 # Singular values of the contact Jacobian, lengths in metres, below which a direction is lost. A
 # posture is known to 1e-12, and where contacts hold a direction to second order only, as legs
@@ -184,6 +187,12 @@ class Stance:
     def at_rest(self) -> Stance:
         """The same stance without its motion."""
         return Stance(self.robot, self.q, self.contacts, False, self.loads)
+
+    def show(self) -> ShownPage:
+        """The stance in 3-D under the paper's two criteria, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self)
 
     @property
     def contact_names(self) -> tuple[str, ...]:

@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from copsense.explore.showing import ShownPage
+    from copsense.stance import Stance
+
 ON_EDGE = 1e-9  # m: a centre of pressure this near to its sole's edge is on it, and on the sole
 _SHOWN = 5  # criteria, and contacts, that the representation lists
 _COLUMNS = (
@@ -258,6 +261,12 @@ class Sweep(LabelledResult):
         from copsense.plots import plot_results
 
         return plot_results(self)
+
+    def show(self, stance: Stance) -> ShownPage:
+        """A film in 3-D on the stance it was made of, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self, stance)
 
     def __repr__(self) -> str:
         """Robot, path, and over which part of it each criterion keeps every contact planted."""

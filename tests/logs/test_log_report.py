@@ -62,7 +62,9 @@ def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(page, comparis
     assert all(img["src"].startswith("data:image/svg+xml;base64,") for img in page.all("img"))
     names = {attributes.get("id") for _, attributes in page.tags}
     assert all(a["href"][1:] in names for a in page.all("a"))
-    assert [f["id"] for f in page.all("figure")] == [f.name for f in draw_log_figures(comparison)]
+    figures = [f.name for f in draw_log_figures(comparison)]
+    assert [f["id"] for f in page.all("figure")] == [*figures, "log_film"]
+    assert [f["sandbox"] for f in page.all("iframe")] == ["allow-scripts"]
 
 
 def test_the_page_has_the_numbers_and_what_the_audit_found(page, comparison):

@@ -23,5 +23,6 @@ def blank_pictures(monkeypatch):
         return [replace(figure, draw=SimpleNamespace) for figure in report_figures(reproduction)]
 
     monkeypatch.setattr(report_files, "report_figures", figures)
+    monkeypatch.setattr(report_files, "report_scenes", lambda reproduction: ())
     monkeypatch.setattr(report_folder, "lay_out", lambda figure: None)
     monkeypatch.setattr(report_folder, "render_figure", lambda figure, suffix: b"<svg/>")

@@ -36,6 +36,7 @@ from copsense.uncertainty import Spread, Uncertainty, propagate_uncertainty
 if TYPE_CHECKING:
     import pandas as pd
 
+    from copsense.explore.showing import ShownPage
     from copsense.plots.style import Figure
 
 
@@ -111,6 +112,12 @@ class Analysis:
 
         spreads = [self.spreads[name] for name in self.sensitivities] if self.spreads else None
         return plot_stance(self.stance, list(self.sensitivities.values()), spreads)
+
+    def show(self) -> ShownPage:
+        """The posture in 3-D with these criteria, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self)
 
     def __str__(self) -> str:
         """The table, without the notes."""

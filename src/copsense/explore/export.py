@@ -36,10 +36,6 @@ td, th { padding: .1rem .9rem .1rem 0; text-align: left; white-space: nowrap; }
 code { overflow-wrap: anywhere; font-size: .85em; }
 footer, .marks { opacity: .75; font-size: .85em; }
 """
-_MARKS = (
-    "Balls are the centres of pressure at rest, squares those that the recorded motion's inertia "
-    "asks for, diamonds what was measured."
-)
 _HEADS = ("criterion", "contact", "load", "CoP x, y [mm]", "margin [mm]", "CoM travel [mm]")
 _FILM_HEADS = ("centres of pressure", "least margin [mm]", "of", "at")
 
@@ -50,6 +46,7 @@ def page_of(
     *,
     meshes: bool = False,
     rate: float = RATE,
+    command: str | None = None,
     advance: Callable[[int], object] = lambda _: None,
 ) -> str:
     """A view, or a run, as a self-contained page: the robot in 3-D, a table, the command.
@@ -60,6 +57,7 @@ def page_of(
         meshes: show the robot's meshes; the page then holds them and says who made them. If not,
             the stick figure.
         rate: frames a second of a run.
+        command: the line that shows it again; default that of the model, empty for none.
         advance: called with the number of views that are done, `frames_of` in all.
 
     Raises:
@@ -83,6 +81,7 @@ def page_of(
         scene = film_html([view], shape=shape)
         advance(1)
         body, code = _view_body(view), model.code(state)[0]
+    code = code if command is None else command
     return _page(model.stance.robot.name, scene, body, code, shape.licences)
 
 
@@ -168,6 +167,16 @@ def least_margins(run: PostureRun, views: Sequence[View]) -> dict[str, tuple[flo
     )
 
 
+def marks_words(run: PostureRun) -> str:
+    """What the marks of a film stand for."""
+    moving = ", squares those that the recorded motion's inertia asks for"
+    measured = ", diamonds what was measured"
+    return (
+        "Balls are the centres of pressure at rest"
+        f"{moving * (run.velocities is not None)}{measured * (run.measured is not None)}."
+    )
+
+
 def _run_body(model: PlayedModel, rows: Sequence[int], views: Sequence[View]) -> Parts:
     run = model.run
     colours = criterion_colours([each.name for each in views[0].criteria])
@@ -181,7 +190,7 @@ def _run_body(model: PlayedModel, rows: Sequence[int], views: Sequence[View]) ->
         )
         for what, (margin, contact, value) in least_margins(run, views).items()
     ]
-    marks = f'<p class="marks">{_MARKS}</p>' if run.velocities is not None else ""
+    marks = f'<p class="marks">{marks_words(run)}</p>'
     said = (
         f"{run.source}: {len(run)} postures, {run.axis} from {ends}; {len(views)} of them are "
         "shown. Play, scrub and speed are in the bar under the picture."

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from copsense.log_report.log_figures import draw_log_figures
+from copsense.log_report.log_scenes import draw_log_scenes
 from copsense.log_report.log_words import answer, reach, slope_tables
 from copsense.logs import LogComparison
 from copsense.logs.finding import Finding
 from copsense.provenance import versions
 from copsense.reports import (
     ReportFigure,
+    ReportScene,
     draw_figures,
     fill_report_folder,
     render_template,
@@ -53,7 +55,8 @@ def write_log_report(
         pictures = draw_figures(figures, staging)
         write_json(staging / DATA / "comparison.json", comparison.to_dict())
         write_table(staging / DATA / "rows.csv", *_rows(comparison))
-        return render_log_page(comparison, pictures, figures, command=command)
+        scenes = draw_log_scenes(comparison)
+        return render_log_page(comparison, pictures, figures, scenes, command=command)
 
     return fill_report_folder(folder, make, overwrite=overwrite)
 
@@ -62,6 +65,7 @@ def render_log_page(
     comparison: LogComparison,
     pictures: Mapping[str, bytes],
     figures: Iterable[ReportFigure],
+    scenes: Iterable[ReportScene] = (),
     *,
     command: str = "",
 ) -> str:
@@ -71,6 +75,7 @@ def render_log_page(
         comparison: what to report.
         pictures: figure's name -> its SVG.
         figures: the figures, in order.
+        scenes: the views in 3-D.
         command: the command line that makes this report; may be empty.
 
     Returns:
@@ -88,7 +93,7 @@ def render_log_page(
         "setting": _setting(comparison),
         "versions": versions(("pin", "numpy", "scipy")),
     }
-    return render_template("log_report", [TEMPLATES], figures, pictures, values)
+    return render_template("log_report", [TEMPLATES], figures, pictures, values, scenes)
 
 
 def _finding(finding: Finding) -> dict[str, str]:

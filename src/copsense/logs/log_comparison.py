@@ -22,6 +22,8 @@ from copsense.posture_run import PostureRun
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from copsense.explore.showing import ShownPage
+
 MEASURED = "measured"
 
 
@@ -162,6 +164,12 @@ class LogComparison:
         from copsense.plots import plot_log
 
         return plot_log(self)
+
+    def show(self) -> ShownPage:
+        """The log as a film in 3-D, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self)
 
     def __repr__(self) -> str:
         """Robot, sway and the slopes of the load."""

@@ -15,9 +15,11 @@ from copsense.reports.report_folder import (
     write_json,
     write_table,
 )
+from copsense.reports.report_scene import ReportScene
 
 __all__ = [
     "ReportFigure",
+    "ReportScene",
     "check_report_folder",
     "draw_figures",
     "fill_report_folder",

@@ -9,6 +9,7 @@ from importlib.resources import files
 from jinja2 import DictLoader, Environment, StrictUndefined
 
 from copsense.reports.report_figure import ReportFigure
+from copsense.reports.report_scene import ReportScene
 from copsense.reports.typesetting import typeset
 
 _SHELL = "copsense.reports"  # the page's frame, its style and its macros
@@ -22,6 +23,7 @@ def render_template(
     figures: Iterable[ReportFigure],
     pictures: Mapping[str, bytes],
     values: Mapping[str, object],
+    scenes: Iterable[ReportScene] = (),
 ) -> str:
     """Render a page; the same input gives the same text.
 
@@ -31,6 +33,7 @@ def render_template(
         figures: the figures, in order; each section's are drawn by ``figure_grid(section)``.
         pictures: figure's name -> its SVG.
         values: what the template shows.
+        scenes: the views in 3-D, in order; each section's are shown by ``scene_frames(section)``.
 
     Returns:
         HTML that needs no other file and no network.
@@ -55,9 +58,12 @@ def render_template(
         shown.setdefault(figure.section, []).append(
             {"figure": figure, "source": f"data:image/svg+xml;base64,{address}"}
         )
+    frames: dict[str, list[ReportScene]] = {}
+    for scene in scenes:
+        frames.setdefault(scene.section, []).append(scene)
     style = (files(_SHELL) / "report.css").read_text("utf-8")
     return environment.get_template(name + _TEMPLATE).render(
-        {"style": style, "figures": shown} | dict(values)
+        {"style": style, "figures": shown, "scenes": frames} | dict(values)
     )
 
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from copsense.explore.showing import ShownPage
+    from copsense.stance import Stance
+
 SETTLING = 0.1  # s until the ground has taken up the weight evenly
 _COLUMNS = (
     "com",
@@ -205,6 +208,12 @@ class Recording(LabelledResult):
         from copsense.plots import plot_rollout
 
         return plot_rollout(self)
+
+    def show(self, stance: Stance) -> ShownPage:
+        """A film in 3-D on the stance it was made of, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self, stance)
 
     def __repr__(self) -> str:
         """Robot, controller, how it ended, tracking and margins."""

@@ -3,9 +3,13 @@
 import shutil
 
 import pytest
-from support.browser import chromium
+from support.browser import chromium, colour_at, scene_of
 
+from copsense.explore.drawing import ON_LIGHT
 from copsense.paper.report import report_figures
+from copsense.paper.report.report_scenes import lateral_run
+
+SCENE = ("", "about:srcdoc")  # the 3-D view's own page, which says which GPU it found
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +35,12 @@ def events():
 def page(browser, address, events):
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.on("request", lambda request: events["requests"].append(request.url))
-    page.on("console", lambda message: events["console"].append(message.text))
+    page.on(
+        "console",
+        lambda m: events["console"].extend(
+            [m.text] * (m.type == "error" or m.location["url"] not in SCENE)
+        ),
+    )
     page.on("pageerror", lambda error: events["errors"].append(str(error)))
     page.goto(address, wait_until="load")
     yield page
@@ -52,7 +61,7 @@ def test_the_console_stays_empty(page, events):
 
 def test_every_figure_is_loaded_and_captioned(page, reproduction):
     shown = page.eval_on_selector_all(
-        "figure",
+        "figure:not(.scene)",
         """figures => figures.map(figure => {
             const image = figure.querySelector('img');
             const box = image.getBoundingClientRect();
@@ -67,6 +76,16 @@ def test_every_figure_is_loaded_and_captioned(page, reproduction):
         assert min(figure["width"], figure["height"]) > 100, figure["id"]
         assert len(figure["caption"]) > 40, figure["id"]
         assert figure["alt"], figure["id"]
+
+
+def test_the_robot_plays_in_3_d(page, reproduction):
+    page.locator("#film iframe").scroll_into_view_if_needed()
+    scene = scene_of(page)
+    place = "() => window.__viserMutable.nodeRefFromName['/com'].position.y"
+    scene.wait_for_function(f"Math.abs(({place})()) > 0.03", timeout=60_000)
+    here = lateral_run(reproduction).stance
+    seen, right = colour_at(scene, here.placements[0].translation, ON_LIGHT.sole, reach=40)
+    assert right, seen
 
 
 def test_every_claim_is_shown_with_its_verdict(page, reproduction):

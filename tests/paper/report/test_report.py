@@ -20,6 +20,7 @@ from copsense.paper.report import (
     report_files,
     write_report,
 )
+from copsense.paper.report.report_scenes import report_scenes
 from copsense.paper.report.words import commands, summary
 from copsense.paper.reproduce.real_robot import PUBLIC_PLACE, RECORDED
 from copsense.plots import render_figure
@@ -68,6 +69,16 @@ def test_the_page_needs_nothing_from_elsewhere(page, text):
     assert outside == ["https://arxiv.org/abs/1610.01495", PUBLIC_PLACE]
 
 
+def test_the_robot_stands_in_the_page_in_3_d_or_how_to_have_it_does(page, text, reproduction):
+    (frame,) = page.all("iframe")
+    assert frame["sandbox"] == "allow-scripts"  # it reaches nothing of the page
+    assert len(text) < 3e6
+    figures = report_figures(reproduction)
+    without = render_page(reproduction, {f.name: b"" for f in figures}, figures, command="c")
+    assert "<iframe" not in without
+    assert "copsense[explore]" in without
+
+
 def test_links_within_the_page_lead_somewhere(page):
     names = {attributes.get("id") for _, attributes in page.tags}
     for a in page.all("a"):
@@ -76,9 +87,11 @@ def test_links_within_the_page_lead_somewhere(page):
 
 
 def test_every_figure_has_a_picture_a_caption_and_words_for_it(page, reproduction):
-    figures = report_figures(reproduction)
-    assert [f["id"] for f in page.all("figure")] == [f.name for f in figures]
-    assert len(page.all("img")) == len(page.all("figcaption")) == len(figures)
+    figures, shown = report_figures(reproduction), page.all("figure")
+    drawn = [f["id"] for f in shown if "scene" not in f["class"]]
+    assert drawn == [f.name for f in figures]
+    assert len(page.all("img")) == len(figures)
+    assert len(page.all("figcaption")) == len(shown)
     assert all(len(img["alt"]) > 30 for img in page.all("img"))
     for number_ in ("3a", "3b", "4", "5", "6a", "6b", "7a", "7b", "8", "9a", "9b"):
         assert f"figure_{number_}" in {f.name for f in figures}
@@ -125,7 +138,8 @@ def test_every_erratum_reference_value_and_version_is_on_the_page(
 def test_the_same_reproduction_gives_the_same_page(reproduction, text, command):
     figures = report_figures(reproduction)
     pictures = {f.name: render_figure(f.draw(), ".svg") for f in figures}
-    assert render_page(reproduction, pictures, figures, command=command) == text
+    scenes = report_scenes(reproduction)
+    assert render_page(reproduction, pictures, figures, scenes, command=command) == text
 
 
 def test_what_the_user_typed_is_shown_and_not_interpreted(reproduction):

@@ -18,7 +18,7 @@ from copsense.paper.report.real_section import real_commands, real_reach, real_r
 from copsense.paper.report.words import commands, differs, limit_words, limits, summary
 from copsense.paper.reproduce import Reproduction
 from copsense.paper.reproduce.real_robot import PUBLIC_PLACE
-from copsense.reports import ReportFigure, read_number, render_template
+from copsense.reports import ReportFigure, ReportScene, read_number, render_template
 from copsense.statics import ActiveSetChange
 
 _MARKS = {
@@ -32,6 +32,7 @@ def render_page(
     reproduction: Reproduction,
     pictures: Mapping[str, bytes],
     figures: Iterable[ReportFigure],
+    scenes: Iterable[ReportScene] = (),
     *,
     command: str,
 ) -> str:
@@ -41,6 +42,7 @@ def render_page(
         reproduction: what to report.
         pictures: figure's name -> its SVG.
         figures: the figures, in order.
+        scenes: the views in 3-D.
         command: the command line that makes this report.
 
     Returns:
@@ -86,7 +88,8 @@ def render_page(
         else score_words(reproduction.benchmark),
         "sway_differences": sway_differences(reproduction.sway) if reproduction.sway else (),
     }
-    return render_template("reproduction", ["copsense.paper.report"], figures, pictures, values)
+    package = "copsense.paper.report"
+    return render_template("reproduction", [package], figures, pictures, values, scenes)
 
 
 def _binding(found: ActiveSetChange) -> dict[str, str]:

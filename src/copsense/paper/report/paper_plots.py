@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from copsense.paper.closed_form import Curve, FigureData
 from copsense.paper.reproduce import UnitOfLength
 from copsense.plots.cop_plots import plot_foot_cop
 from copsense.plots.reading import DEG, MM
+from copsense.plots.robot_plots import plot_robot
 from copsense.plots.style import (
     COM_LINE,
     EDGE_LINE,
@@ -22,9 +25,11 @@ from copsense.plots.style import (
     add_legend,
     axes_or_new,
     colours,
+    new_figure,
     put_legend,
     styled,
 )
+from copsense.sensitivity import CopSensitivity
 from copsense.sweeps import Sweep
 
 _FEET: dict[str, Any] = {"left CoP": "-", "right CoP": (0, (4.5, 1.8))}
@@ -186,6 +191,25 @@ def plot_unit_of_length(unit: UnitOfLength, *, ax: Axes | None = None) -> Axes:
     torque = Line2D([], [], color=colour["minimum-torque"], label="minimum-torque")
     put_legend(ax, [dots, line, torque])
     return ax
+
+
+@styled
+def plot_leaning_robot(found: Sequence[Sequence[CopSensitivity]]) -> Figure:
+    """Draw a robot's stick figure from behind at several postures, with the CoPs of criteria.
+
+    Args:
+        found: of each posture, a sensitivity per criterion.
+    """
+    figure = new_figure(9.2, 4.6)
+    panels = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
+    for ax, here in zip(panels, found, strict=True):
+        stance = here[0].equilibrium.stance
+        plot_robot(stance, here, ax=ax, legend=False)
+        y = round(stance.com[1] * MM)
+        ax.set_title(f"CoM y = {y:+d} mm" if y else "CoM y = 0")
+    for ax in panels[1:]:
+        ax.set_ylabel("")
+    return figure
 
 
 def four_bar_left_cops(

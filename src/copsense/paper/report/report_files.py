@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from copsense.paper.report.page import render_page
+from copsense.paper.report.report_scenes import report_scenes
 from copsense.paper.report.static_figures import report_figures
 from copsense.paper.reproduce import Reproduction
 from copsense.reports import draw_figures, fill_report_folder, write_json, write_table
@@ -47,7 +48,8 @@ def _make(reproduction: Reproduction, folder: Path, command: str) -> str:
     figures = report_figures(reproduction)
     pictures = draw_figures(figures, folder)
     _write_data(reproduction, folder / DATA)
-    return render_page(reproduction, pictures, figures, command=command)
+    scenes = report_scenes(reproduction)
+    return render_page(reproduction, pictures, figures, scenes, command=command)
 
 
 def _write_data(reproduction: Reproduction, folder: Path) -> None:

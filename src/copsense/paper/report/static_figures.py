@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from copsense.criterion import minimum_torque, minimum_wrench
 from copsense.paper.claims.icub_sweep import TORQUE, WRENCH
 from copsense.paper.report.closed_loop_section import sway_figures
 from copsense.paper.report.paper_plots import (
@@ -11,9 +12,11 @@ from copsense.paper.report.paper_plots import (
     plot_figure_3,
     plot_figure_9a,
     plot_figure_9b,
+    plot_leaning_robot,
     plot_unit_of_length,
 )
 from copsense.paper.report.real_section import real_figures
+from copsense.paper.report.report_scenes import lateral_run
 from copsense.paper.reproduce import Reproduction
 from copsense.plots import (
     plot_cop,
@@ -27,6 +30,7 @@ from copsense.plots import (
 )
 from copsense.plots.style import Figure
 from copsense.reports import ReportFigure
+from copsense.sensitivity import cop_sensitivity
 from copsense.statics import ActiveSetChange
 from copsense.sweeps import Sweep
 
@@ -65,7 +69,25 @@ def _overview(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             lambda: plot_results(both),
             shape="wide",
         ),
+        ReportFigure(
+            "robot",
+            "overview",
+            "The robot in the middle of the path and at its ends, from behind.",
+            "Lines join the joints; a cross is the CoM, a ring its projection on the ground, dots "
+            "the CoP of each foot: orange under minimum wrench, blue under minimum torque.",
+            "Three stick figures of the iCub from behind: the CoM over the right foot, between the "
+            "feet and over the left one, with the CoPs of both criteria on the soles.",
+            lambda: _draw_robot(reproduction),
+            shape="wide",
+        ),
     )
+
+
+def _draw_robot(reproduction: Reproduction) -> Figure:
+    run = lateral_run(reproduction)
+    stances = [run.at(row) for row in (0, len(run) // 2, len(run) - 1)]
+    criteria = minimum_wrench(1.0), minimum_torque()
+    return plot_leaning_robot([[cop_sensitivity(s, c) for c in criteria] for s in stances])
 
 
 def _four_bar(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
