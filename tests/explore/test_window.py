@@ -1,20 +1,31 @@
 """The window: its doors, what a slider does through viser's protocol, and in a real browser."""
 
 import shlex
+from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
-from support.browser import chromium
+from support.browser import chromium, colour_at
 from support.commands import copsense as command
 
+import copsense
 from copsense.explore import Model, Setting, State
+from copsense.explore.played_model import PlayedModel
 from copsense.limits import Limits
+from copsense.posture_run import PostureRun
 
 viser = pytest.importorskip("viser", reason="the extra explore is not installed")
 
 from support.viser_client import Client  # noqa: E402
 
+from copsense.explore.drawing import NAMED  # noqa: E402
 from copsense.explore.explorer import Explorer  # noqa: E402
+
+READY = (
+    "window.__viserMutable && window.__viserMutable.scene"
+    " && window.__viserMutable.messageQueue.length === 0"
+)
+COMMAND = "document.querySelector('#copsense-command').innerText"
 
 
 @pytest.fixture(scope="module")
@@ -72,25 +83,59 @@ def browser():
         yield browser
 
 
-def test_in_a_browser_a_slider_changes_the_table(browser, explorer):
+@contextmanager
+def page_of(browser, explorer):
+    """The window in a browser, ready, its errors kept on it."""
     page = browser.new_page(viewport={"width": 1000, "height": 700})
-    errors = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    page.goto(explorer.url)
+    page.failed = []
+    page.on("pageerror", lambda error: page.failed.append(str(error)))
+    page.goto(f"{explorer.url}?fixedDpr=1")
     page.wait_for_selector("#copsense-command", timeout=60_000)
-    explorer._reset()
-    page.wait_for_function(
-        "document.querySelector('#copsense-command').innerText === 'copsense analyse icub'"
-    )
-    before = page.locator("table").inner_text()
-    label = page.locator("label", has_text="com_y [mm]")
-    slider = label.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
-    slider.locator("input[type=text]").fill("25")
-    page.wait_for_function(
-        "document.querySelector('#copsense-command').innerText.includes('--com-y 0.025m')"
-    )
-    assert page.locator("table").inner_text() != before
-    found = explorer.view["minimum-torque"]
-    assert f"{1e3 * found.margin[1]:.1f} to +y" in page.locator("table").inner_text()
-    assert errors == []
+    page.wait_for_function(READY, timeout=60_000)
+    # It covers a corner, and says that there is no GPU.
+    close = page.locator(".mantine-Notification-closeButton")
+    for _ in range(close.count()):
+        close.first.click()
+    yield page
     page.close()
+
+
+def test_in_a_browser_a_slider_changes_the_table_and_the_picture(browser, explorer):
+    explorer._reset()
+    with page_of(browser, explorer) as page:
+        page.wait_for_function(f"{COMMAND} === 'copsense analyse icub'")
+        before = page.locator("table").inner_text()
+        label = page.locator("label", has_text="com_y [mm]")
+        slider = label.locator("xpath=ancestor::div[contains(@class,'Flex-root')][1]")
+        slider.locator("input[type=text]").fill("25")
+        page.wait_for_function(f"{COMMAND}.includes('--com-y 0.025m')")
+        said = page.locator("table").inner_text()
+        assert said != before
+        view = explorer.view
+        assert f"{1e3 * view['minimum-torque'].margin[1]:.1f} to +y" in said
+        # A foot's two dots are where its centres of pressure are.
+        for name in ("minimum-wrench", "minimum-torque"):
+            assert view[name].margin[1] > 0
+            seen, right = colour_at(page, view[name].cop_world[1], NAMED[name])
+            assert right, (name, seen)
+        line = page.locator("#copsense-command").inner_text()
+        answer = command(*shlex.split(line)[1:], "--json").json
+        told = answer["criteria"]["minimum-torque"]["contacts"]["r_sole"]["margin"]
+        assert f"{1e3 * told:.1f} to +y" in said
+        assert page.failed == []
+
+
+def test_in_a_browser_a_run_is_played(browser, icub):
+    path = copsense.lateral_sweep(icub, -0.03, 0.03, 13)
+    model = PlayedModel(PostureRun.of_stances(path.stances, source="a sweep"), ["icub"])
+    with (
+        Explorer(model, meshes=False, light=True) as explorer,
+        page_of(browser, explorer) as page,
+    ):
+        where = "window.__viserMutable.nodeRefFromName['/com'].position.y"
+        first, said = page.evaluate(where), page.locator("table").inner_text()
+        page.get_by_label("play").check()
+        page.wait_for_function(f"Math.abs({where} - {first}) > 0.01", timeout=30_000)
+        page.get_by_label("play").uncheck()
+        assert page.locator("table").inner_text() != said
+        assert page.failed == []

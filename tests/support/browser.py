@@ -63,12 +63,14 @@ def scene_of(page, number=1):
 def colour_at(scene, point, colour, wait=20.0, reach=3):
     """The colour nearest to one around where a point of the world is seen, and if it is that one.
 
-    Waits until it is near, or for so many seconds: the first frames may be empty.
+    In the frame of a 3-D view, or in a page that is one. Waits until it is near, or for so many
+    seconds: the first frames may be empty.
     """
     end = time.monotonic() + wait
     while True:
         x, y = scene.evaluate(_PLACE, [float(value) for value in point])
-        picture = scene.frame_element().screenshot()
+        framed = getattr(scene, "frame_element", None)  # a page is not in a frame
+        picture = scene.screenshot() if framed is None else framed().screenshot()
         image = Image.open(io.BytesIO(picture)).convert("RGB")
         seen = [
             image.getpixel((round(x) + i, round(y) + j))
