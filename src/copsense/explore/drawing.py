@@ -40,6 +40,7 @@ _FORMS: Mapping[str, tuple[float, float]] = {"square": (1.5, 3.0), "diamond": (3
 NO_LABELS, CONTACTS, LARGEST, JOINTS = "none", "contacts", "largest torques", "all torques"
 LABELS = (NO_LABELS, CONTACTS, LARGEST, JOINTS)
 _LARGEST = 6  # torques
+_NARROW = 700  # pixels
 _LIFT = 0.002  # m: outlines over the ground, so that they do not flicker
 
 
@@ -88,6 +89,17 @@ def place_camera(server: Any, view: View, distance: float = 1.0) -> None:
     middle, size = look_at(view)
     server.initial_camera.look_at = middle
     server.initial_camera.position = middle + distance * size * np.array([1.05, -0.7, 0.3])
+
+
+def fit_camera(client: Any, view: View) -> None:
+    """Have the robot over the panel, which is at the bottom of a narrow browser, on a phone say."""
+    if client.camera.image_width >= _NARROW:
+        return
+    middle, size = look_at(view)
+    away = 1.9 * size
+    with client.atomic():
+        client.camera.position = middle + away * np.array([0.8, -0.54, 0.27])
+        client.camera.look_at = middle - np.array([0.0, 0.0, 0.5 * away])
 
 
 def effort_colour(share: float) -> Colour:
@@ -270,7 +282,7 @@ class Scene:
                 self._arrows[name] = self._scene.add_arrows(
                     f"/force/{len(self._arrows)}",
                     np.zeros((len(view.contacts), 2, 3), np.float32),
-                    colour,
+                    _for_arrows(colour),
                     shaft_radius=0.5 * self._unit,
                     head_radius=1.2 * self._unit,
                     head_length=2.5 * self._unit,
@@ -306,7 +318,7 @@ class Scene:
             self._loads = self._scene.add_arrows(
                 "/loads",
                 np.zeros((1, 2, 3), np.float32),
-                LOADED,
+                _for_arrows(LOADED),
                 shaft_radius=0.7 * self._unit,
                 head_radius=1.6 * self._unit,
                 head_length=3.0 * self._unit,
@@ -380,6 +392,14 @@ def _labels(view: View, shown: Shown) -> dict[str, tuple[str, np.ndarray]]:
             text = f"{name}: {found.torques[i]:.1f} {view.torque_units[i]}{effort}"
             texts[f"joint {name}"] = text, view.poses[view.joints.index(joint), :3]
     return texts
+
+
+def _for_arrows(colour: Colour) -> Colour:
+    """A colour as arrows have to be given it: viser 1.1 takes theirs to be linear, not sRGB."""
+    share = np.array(colour) / 255.0
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    r, g, b = (int(value) for value in np.round(255 * linear))
+    return r, g, b
 
 
 def _closed(outlines: Sequence[np.ndarray], lift: float) -> np.ndarray:

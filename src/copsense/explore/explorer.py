@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from copsense.design import Objective
 from copsense.errors import CopsenseError
 from copsense.explore.best_weights import best_weights
-from copsense.explore.drawing import Scene, look_at, place_camera
+from copsense.explore.drawing import Scene, fit_camera, look_at, place_camera
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
 from copsense.explore.played_model import PlayedModel
@@ -118,6 +118,7 @@ class Explorer:
         self._compiling: threading.Thread | None = None
         self._weighing = threading.Lock()
         place_camera(viser, first)
+        viser.on_client_connect(lambda client: fit_camera(client, self.view or first))
         self._publish(first)
         self._limited = threadpool_limits(1)  # small matrices: more threads only cost
         self._worker.start()

@@ -272,6 +272,7 @@ class Panel:
         with self._assigning.silently():
             slider.min = min(low, slider.value)
             slider.max = max(high, slider.value, slider.min + _LEAST_SPAN)
+            slider.disabled = high - low <= _LEAST_SPAN  # nothing to choose
 
     def write(self, view: View, status: str, save: str = "") -> None:
         """Show a view's words and numbers."""

@@ -46,7 +46,11 @@ def status_html(view: View, status: str) -> str:
 def table_html(view: View, colours: Mapping[str, Colour]) -> str:
     """The table of a view."""
     parts, last = [], ""
-    for criterion, contact, load, cop, margin, travel in view.rows:
+    heads = ["contact", "load", "CoP x, y", "margin", "CoM travel"]
+    rows = view.rows
+    if all(row[4] == "-" for row in rows):  # no contact has a sole
+        heads, rows = heads[:3] + heads[4:], [(*row[:4], row[5]) for row in rows]
+    for criterion, *words in rows:
         if criterion != last:
             dot = css(colours[criterion])
             parts.append(
@@ -54,15 +58,9 @@ def table_html(view: View, colours: Mapping[str, Colour]) -> str:
                 f'<span style="color:{dot}">&#9679;</span> {_text(criterion)}</th></tr>'
             )
             last = criterion
-        cells = "".join(
-            f'<td style="{_CELL}">{_text(word)}</td>'
-            for word in (contact, load, cop, margin, travel)
-        )
+        cells = "".join(f'<td style="{_CELL}">{_text(word)}</td>' for word in words)
         parts.append(f"<tr>{cells}</tr>")
-    head = "".join(
-        f'<td style="opacity:.6;padding:0 .3em 0 0">{word}</td>'
-        for word in ("contact", "load", "CoP x, y", "margin", "CoM travel")
-    )
+    head = "".join(f'<td style="opacity:.6;padding:0 .3em 0 0">{word}</td>' for word in heads)
     shades = ",".join(css(effort_colour(share)) for share in (0.0, 0.5, 1.0))
     return (
         '<div style="padding:0 .8em;overflow-x:auto"><table style="font-size:.72em;'

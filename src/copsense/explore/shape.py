@@ -25,6 +25,7 @@ from copsense.sdf import sdf_model_element
 from copsense.xml_numbers import read_numbers
 
 TRIANGLES = 27_000  # of a whole robot: more are slow to send and, without a GPU, to draw
+_CAREFUL = 3.0  # of fast_simplification's 0 (slow, good) to 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,15 +243,34 @@ def _reduced(meshes: list[JointMesh], triangles: int) -> list[JointMesh]:
     require("fast_simplification", "drawing meshes of many triangles")
     import fast_simplification
 
+    kept = _shared([len(mesh.faces) for mesh in meshes], triangles)
     found = []
-    for mesh in meshes:
+    for mesh, count in zip(meshes, kept, strict=True):
+        if count >= len(mesh.faces):
+            found.append(mesh)
+            continue
         points, faces = fast_simplification.simplify(
             np.asarray(mesh.vertices, np.float32),
             np.asarray(mesh.faces, np.int32),
-            target_reduction=min(1.0 - triangles / total, 0.99),
+            target_reduction=1.0 - count / len(mesh.faces),
+            agg=_CAREFUL,
         )
         found.append(JointMesh(mesh.joint, np.asarray(points, float), np.asarray(faces, np.int64)))
     return found
+
+
+def _shared(counts: list[int], triangles: int) -> list[int]:
+    """How many triangles each mesh keeps: as the square roots of what they have, none too few.
+
+    In proportion, a hand would be a wedge beside a head of many.
+    """
+    roots, kept = np.sqrt(np.array(counts, float)), np.array(counts, float)
+    low, high = 0.0, float(roots.max())
+    for _ in range(40):  # of the factor
+        factor = 0.5 * (low + high)
+        kept = np.minimum(counts, factor * roots)
+        low, high = (factor, high) if kept.sum() < triangles else (low, factor)
+    return [int(count) for count in kept]
 
 
 def _licence(file: Path) -> str:
