@@ -18,7 +18,7 @@ that where the solver's own precision is enough, in a control loop or for a line
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.linalg
@@ -31,6 +31,9 @@ from copsense.statics import qp
 from copsense.statics.symmetric import SymmetricSystem
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
+# The same, to the solver: of two rows that nearly meet it must not take the wrong one. Where rows
+# all but meet in one corner it can do no better than the former.
+_SOLVED = 1e-12
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
 _ZERO = 1e-12  # norm of a row that limits nothing
 _FAR = 1e4  # units: no x is looked for farther out
@@ -139,7 +142,11 @@ class Program(ShortRepr):
             UnsolvedError: neither solver found an x that meets the optimality conditions.
         """
         errors = []
-        for solver in (self._active_by_daqp, self._active_by_nnls):
+        for solver in (
+            partial(self._active_by_daqp, _SOLVED),
+            partial(self._active_by_daqp, _FEASIBLE),
+            self._active_by_nnls,
+        ):
             held = solver()
             if held is None:
                 continue
@@ -242,14 +249,17 @@ class Program(ShortRepr):
             (self.b - self.A @ self.start) / scale,
         )
 
-    def _active_by_daqp(self) -> np.ndarray | None:
-        """Rows that hold at the optimum by daqp's dual active-set method; None if it fails."""
+    def _active_by_daqp(self, tolerance: float) -> np.ndarray | None:
+        """Rows that hold at the optimum by daqp's dual active-set method; None if it fails.
+
+        The tolerance is the solver's own, in shares of the unit.
+        """
         H, h, A, b = self._reduced
         if not len(b) or not len(h):
             return np.zeros(0, dtype=int)
         size = self.curvature[-1]
         _, flag, l = qp.dual_active_set(
-            H / size, h / size, A, b, primal_tol=_FEASIBLE * self.unit, dual_tol=1e-12
+            H / size, h / size, A, b, primal_tol=tolerance * self.unit, dual_tol=1e-12
         )
         return None if flag < 1 else np.flatnonzero(np.abs(l) > 0)
 
