@@ -31,6 +31,7 @@ _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least he
 # The stencil's error falls with the fourth power where derivatives are large: shares of the step.
 _SHORTER = (1.0, 0.1, 0.01)
 _STILL = 1e-12  # gains under which nothing moves
+_HELD = 1e-9  # gains of a centre of pressure that limits hold at a vertex
 _LISTED = 6  # contacts that the representation lists
 _ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
 
@@ -231,8 +232,9 @@ class CopSensitivity:
         are, so that ``|s| / |grad s|`` with ``grad s = (b - a . p) grad w - w a' Gamma`` is exact
         for such criteria. The least of a sole's edges counts, see `tipping_edge`. Negative where
         the CoP is off the sole already or the contact pulls; infinite where no edge comes nearer
-        (a point contact, or a contact without a sole). A sole that is a line tips over its side as
-        soon as the CoP leaves it.
+        (a point contact, or a contact without a sole). Where limits hold the CoP at a vertex, all
+        edges are met at once, as the contact loses its load. A sole that is a line tips over its
+        side as soon as the CoP leaves it.
         """
         return self._tipping[0]
 
@@ -260,8 +262,15 @@ class CopSensitivity:
         speed = np.hypot(rate[:, 0], rate[:, 1])
         np.divide(slack, speed, out=distance, where=speed > _STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
+        falls = np.hypot(self.load_gain[:, 0], self.load_gain[:, 1])
+        held = np.abs(self.com_gain).max(axis=(1, 2), initial=0.0) < _HELD
         for k, rows in enumerate(stance.edges):
-            if rows.stop > rows.start:
+            if rows.stop > rows.start and held[k]:
+                # At a vertex that limits hold it meets all edges at once, where the load is gone.
+                if falls[k] > _STILL:
+                    share = self.equilibrium.wrenches[k, 2] / stance.robot.weight
+                    travel[k], edge[k] = share / falls[k], 0
+            elif rows.stop > rows.start:
                 nearest = int(distance[rows].argmin())
                 travel[k] = distance[rows][nearest]
                 edge[k] = nearest if travel[k] < np.inf else -1

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.compiler import compiled
-from copsense.batch.lanes import load, root, splat, store, where_less
+from copsense.batch.lanes import load, magnitude, root, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.statics.inertia import ancestor
 from copsense.batch.statics.loops import factorise
@@ -23,6 +23,7 @@ from copsense.batch.workspace import Offsets
 
 _STILL = 1e-12  # gains under which nothing moves, as in `CopSensitivity`
 _ON_EDGE = 1e-9  # m: a centre of pressure this far off its sole is on the edge, likewise
+_HELD = 1e-9  # gains of a centre of pressure that limits hold at a vertex, likewise
 _FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways
 
 
@@ -165,6 +166,18 @@ def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
                 nearest = where_less(distance, free, 1.0 * (e - feet.edge_first[k]), nearest)
                 free = where_less(distance, free, distance, free)
         store(W, offset.margin + k, least)
+        if travel and feet.edge_first[k] < feet.edge_first[k + 1]:
+            # A CoP that limits hold at a vertex meets all edges at once, where the load is gone.
+            moves = splat(0.0)
+            for e in range(4):
+                entry = magnitude(load(W, offset.gain + 4 * k + e))
+                moves = where_less(moves, entry, entry, moves)
+            u, v = load(W, offset.load_gain + 2 * k), load(W, offset.load_gain + 2 * k + 1)
+            fall = root(u * u + v * v)
+            empty = where_less(_STILL, fall, w / fall, splat(np.inf))
+            first = where_less(_STILL, fall, splat(0.0), splat(-1.0))
+            free = where_less(moves, _HELD, empty, free)
+            nearest = where_less(moves, _HELD, first, nearest)
         if travel:
             store(W, offset.travel + k, free)
             store(W, offset.edge + k, nearest)
