@@ -37,7 +37,8 @@ INTERNAL = (
     "copsense.statics.program",
 )
 IN_THE_LOOP = {"Command", "Observation", "Snapshot", "Target"}  # good until the next step
-FILLED = ("batch.", "chart postures.")  # into arrays that may be the caller's own
+# Into arrays that may be the caller's own.
+FILLED = ("batch.", "batch within limits.", "chart postures.")
 HOLDERS = re.compile("ndarray|Mapping|dict|list")
 
 

@@ -186,6 +186,7 @@ def all_results(icub) -> dict[str, object]:
         ),
         "preset": PRESETS["icub"],
         "batch": kernel.evaluate(bar.q[None]),
+        "batch within limits": BatchKernel(bar, [TORQUE], LIMITS).evaluate(bar.q[None]),
         "kernel": kernel,
         "chart": chart,
         "chart postures": chart.solve(np.array([[y]])),

@@ -12,10 +12,12 @@ from copsense.batch.postures.coordinates import coordinate_names
 from copsense.batch.postures.posture_batch import PostureBatch
 from copsense.batch.statics.batch_kernel import BatchKernel, evaluate_batch
 from copsense.batch.statics.batch_result import BatchResult
+from copsense.batch.statics.limit_result import LimitResult
 
 __all__ = [
     "BatchKernel",
     "BatchResult",
+    "LimitResult",
     "PostureBatch",
     "PostureChart",
     "chart_posture",

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.arrays import owned
+from copsense.arrays import array_property, owned
 from copsense.changes import StanceChange
 from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
@@ -204,9 +204,13 @@ class ConstrainedEquilibrium(StaticEquilibrium):
             rows: how the rows A of the limits change besides (p, r, m), as with a coefficient of
                 friction; in the order of `names`.
         """
-        held = np.flatnonzero(self._problem.strong)
-        solved = self._problem.differentiate(self, change, held, rows)
+        solved = self._problem.differentiate(self, change, self.pressing, rows)
         return solved[0], solved[1]
+
+    @array_property
+    def pressing(self) -> Int[np.ndarray, " a"]:
+        """Rows that press."""
+        return np.flatnonzero(self._problem.strong)
 
     def pressing_after(self, direction: Float[np.ndarray, " nv"]) -> Int[np.ndarray, " a"]:
         """Rows that press once an admissible motion has begun."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import TypeGuard
 
 import numpy as np
@@ -19,12 +20,28 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, whole_number
 from copsense.batch.layout import robot_layout, why_not_covered
-from copsense.batch.statics.batch_result import GAINS, BatchResult, arrays_of, empty_result
+from copsense.batch.statics.batch_result import (
+    GAINS,
+    BatchResult,
+    arrays_of,
+    empty_result,
+    nothing,
+)
 from copsense.batch.statics.compiled_kernel import CompiledKernel
+from copsense.batch.statics.compiled_limits import CompiledLimits
 from copsense.batch.statics.criteria import kernel_criteria
+from copsense.batch.statics.kernel_limits import kernel_limits
+from copsense.batch.statics.limit_result import (
+    LimitResult,
+    empty_limits,
+    limit_arrays,
+    limit_template,
+)
+from copsense.batch.statics.limit_states import IMPOSSIBLE, UNLOADED
 from copsense.batch.statics.reference import fill_row, sole_edges
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
+from copsense.limits import Limits, optional_limits
 from copsense.stance import Stance
 from copsense.statics import WrenchPolicy, policy_name
 
@@ -39,6 +56,7 @@ class BatchKernel:
         stance: gives robot and contacts; its configuration does not matter.
         criteria: the criteria or policies, of distinct names.
         names: of the criteria.
+        limits: what wrenches and torques must respect; None for nothing.
         gains: whether CoM gain, CoM travel and tipping edge are computed too.
         fallback_reason: why the reference answers everything; empty where the kernel does its
             part.
@@ -47,6 +65,7 @@ class BatchKernel:
     stance: Stance
     criteria: tuple[Criterion | WrenchPolicy, ...]
     names: tuple[str, ...]
+    limits: Limits | None
     gains: bool
     fallback_reason: str
 
@@ -56,17 +75,24 @@ class BatchKernel:
         return f"BatchKernel({self.stance.robot.name!r}; criteria {', '.join(self.names)}{how})"
 
     def __init__(
-        self, stance: Stance, criteria: Sequence[Criterion | WrenchPolicy], *, gains: bool = True
+        self,
+        stance: Stance,
+        criteria: Sequence[Criterion | WrenchPolicy],
+        limits: Limits | None = None,
+        *,
+        gains: bool = True,
     ) -> None:
         """Check the criteria and lay out the robot.
 
         Args:
             stance: gives robot and contacts.
             criteria: criteria of distinct names, or policies q -> wrenches.
+            limits: what wrenches and torques must respect; None for nothing. Policies take none.
             gains: compute CoM gain, CoM travel and tipping edge too.
 
         Raises:
-            InvalidInputError: no criterion, two of one name, or weights that do not fit.
+            InvalidInputError: no criterion, two of one name, weights or limits that do not fit.
+            UnknownNameError: limits of a contact or a joint that does not exist.
         """
         if isinstance(criteria, Criterion):
             raise InvalidInputError("criteria is a single criterion. Give a list of them.")
@@ -78,6 +104,15 @@ class BatchKernel:
                 "Give at least one; Criterion.named(...) renames one."
             )
         self.names = tuple(names)
+        self.limits = optional_limits(limits)
+        self._template: LimitResult | None = None
+        if self.limits is not None:
+            if policies := [n for n, c in zip(names, criteria, strict=True) if not _is_given(c)]:
+                raise InvalidInputError(
+                    f"limits apply to a Criterion; the policy {policies[0]!r} has to respect them "
+                    "itself. Leave limits or the policy out."
+                )
+            self._template = limit_template(stance, self.limits, len(names))
         self._single: _Single | None = None
         self._nq = int(stance.robot.model.nq)
         self._expected = arrays_of(self.empty(0))
@@ -95,6 +130,9 @@ class BatchKernel:
         if not self.fallback_reason:
             layout = robot_layout(stance, sole_edges(stance))
             self._kernel = CompiledKernel(layout, served, self._nq)
+            if self.limits is not None:
+                rows = kernel_limits(stance, self.limits)
+                self._within = CompiledLimits(layout, served, rows, self._nq)
             if not len(layout.feet.support):
                 self.fallback_reason = "no joint moves between the contacts"
 
@@ -104,7 +142,9 @@ class BatchKernel:
 
         True where the reference answers everything.
         """
-        return bool(self.fallback_reason) or self._kernel.compiled
+        if self.fallback_reason:
+            return True
+        return self._kernel.compiled and (self.limits is None or self._within.compiled)
 
     def compile(self) -> None:
         """Have the kernel compiled now: seconds, once on a machine, kept on disk.
@@ -117,7 +157,10 @@ class BatchKernel:
     def empty(self, count: int) -> BatchResult:
         """Arrays for the results of `count` postures, to be filled with ``out=``."""
         size = whole_number(count, "the number of postures", least=0)
-        return empty_result(self.stance, self.names, size, gains=self.gains)
+        result = empty_result(self.stance, self.names, size, gains=self.gains)
+        if self._template is None:
+            return result
+        return replace(result, limits=empty_limits(self._template, size))
 
     def evaluate(
         self,
@@ -154,18 +197,37 @@ class BatchKernel:
 
     def _fill(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         """Have the kernel fill the results, block by block."""
-        fill, blocks = self._kernel.filling(q, result, doubtful), -(-len(q) // _CHUNK)
+        blocks = -(-len(q) // _CHUNK)
+
+        fills = [self._filling(q, result, doubtful, _CHUNK) for _ in range(threads)]
 
         def run(share: int) -> None:
-            W = self._kernel.workspace()
             for block in range(share, blocks, threads):
-                fill(W, block * _CHUNK, min((block + 1) * _CHUNK, len(q)))
+                fills[share](block * _CHUNK, min((block + 1) * _CHUNK, len(q)))
 
         if threads == 1:
             run(0)
         else:
             with ThreadPoolExecutor(threads) as pool:
                 list(pool.map(run, range(threads)))
+
+    def _filling(
+        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, block: int
+    ) -> Callable[[int, int], bool]:
+        """A function of a first row and an end, at most a block apart, for one thread.
+
+        It has the kernel fill these rows, and returns whether any of them is doubtful.
+        """
+        fill = partial(self._kernel.filling(q, result, doubtful), self._kernel.workspace())
+        if self.limits is None:
+            return fill
+        limit, memory = self._within.filling(q, result, doubtful), self._within.workspace(block)
+
+        def both(start: int, stop: int) -> bool:
+            fill(start, stop)
+            return limit(*memory, start, stop)
+
+        return both
 
     def _answered(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray) -> BatchResult:
         """The result, its doubtful rows filled by the reference."""
@@ -175,7 +237,24 @@ class BatchKernel:
             reason = fill_row(self.stance, q[row], self.criteria[column], result, row, column)
             if reason:
                 reasons[row, column] = reason
+        if result.limits is not None:
+            reasons |= self._without_answer(result, result.limits, doubtful)
         return replace(result, reasons=reasons)
+
+    def _without_answer(
+        self, result: BatchResult, limits: LimitResult, doubtful: np.ndarray
+    ) -> dict[tuple[int, int], str]:
+        """Clear the rows that the limited kernel found to have no answer; why they have none."""
+        state, contacts = limits.state, self.stance.contact_names
+        without = ((state == IMPOSSIBLE) | (state == UNLOADED)) & (doubtful == 0)
+        if not without.any():
+            return {}
+        for name, array in arrays_of(result).items():
+            if name != "com" and len(array):
+                array[without] = nothing(name)
+        limits.margins[without & (state == IMPOSSIBLE)] = np.nan
+        rows = [(int(i), int(j)) for i, j in np.argwhere(without)]
+        return {(i, j): limits.reason(i, j, contacts) for i, j in rows}
 
     def _checked(self, configurations: ArrayLike) -> Float[np.ndarray, "N nq"]:
         robot, nq = self.stance.robot, self._nq
@@ -209,6 +288,17 @@ class BatchKernel:
                     f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
                     f"writeable; the batch needs {wanted.dtype} of shape {shape}. {remedy}"
                 )
+        if (out.limits is None) != (self.limits is None):
+            raise InvalidInputError(f"out is with limits, or the batch is, and not both. {remedy}")
+        if out.limits is not None and self._template is not None:
+            wanted_limits = limit_arrays(self._template)
+            for name, array in limit_arrays(out.limits).items():
+                wanted = wanted_limits[name]
+                fits = array.shape == (count, *wanted.shape[1:]) and array.dtype == wanted.dtype
+                if not (fits and array.flags.carray and out.limits.limits == self.limits):
+                    raise InvalidInputError(
+                        f"out.limits.{name} does not fit the limits of the batch. {remedy}"
+                    )
         if out.criteria != self.names:
             raise InvalidInputError(
                 f"out holds the criteria {', '.join(out.criteria)}, the batch "
@@ -233,23 +323,23 @@ class _Single:
         self.row = self.q[0]
         self.doubtful = np.ones((1, len(kernel.names)), dtype=np.uint8)
         self._partial = not kernel._serves_all  # in doubt whatever the kernel says
-        self._fill: Callable[[np.ndarray, int, int], bool] | None = None
+        self._fill: Callable[[int, int], bool] | None = None
         if not kernel.fallback_reason:
-            self._fill = kernel._kernel.filling(self.q, self.result, self.doubtful)
-            self._W = kernel._kernel.workspace()
+            self._fill = kernel._filling(self.q, self.result, self.doubtful, 1)
 
     def evaluate(self, q: np.ndarray) -> bool:
         """Fill the result for a configuration (nq,); whether any criterion is in doubt."""
         self.row[:] = q
         if self._fill is None:
             return True
-        return bool(self._fill(self._W, 0, 1)) or self._partial
+        return bool(self._fill(0, 1)) or self._partial
 
 
 def evaluate_batch(
     stance: Stance,
     configurations: ArrayLike,
     criteria: Sequence[Criterion | WrenchPolicy],
+    limits: Limits | None = None,
     *,
     gains: bool = True,
     out: BatchResult | None = None,
@@ -261,6 +351,8 @@ def evaluate_batch(
         stance: gives robot and contacts; its own configuration does not matter.
         configurations: one in each row (N, nq).
         criteria: criteria of distinct names, or policies q -> wrenches.
+        limits: what wrenches and torques must respect; None for nothing. The results are then those
+            within the limits, and `BatchResult.limits` says which limits press.
         gains: compute CoM gain, CoM travel and tipping edge too.
         out: results of the same shape to overwrite, so that nothing is allocated.
         threads: threads that share the postures; the results do not depend on it.
@@ -273,8 +365,12 @@ def evaluate_batch(
         InvalidInputError: configurations of the wrong shape, not finite or not normalised;
             criteria that do not fit; `out` of another shape.
     """
-    batch = BatchKernel(stance, criteria, gains=gains)
+    batch = BatchKernel(stance, criteria, limits, gains=gains)
     return batch.evaluate(configurations, out=out, threads=threads)
+
+
+def _is_given(criterion: object) -> bool:
+    return isinstance(criterion, Criterion)
 
 
 def _is_row(value: object, row: np.ndarray) -> bool:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
+from copsense.batch.statics.limit_result import LimitResult
 from copsense.content import freeze
 from copsense.stance import Stance
 
@@ -36,6 +37,7 @@ class BatchResult:
         load_share: f_z / (m g) of each contact.
         com: centre of mass in the world [m].
         reasons: (posture, criterion index) -> why that row failed.
+        limits: how the postures stand to their limits; None without limits.
     """
 
     criteria: tuple[str, ...]
@@ -51,6 +53,7 @@ class BatchResult:
     load_share: Float[np.ndarray, "N nk nc"]
     com: Float[np.ndarray, "N 3"]
     reasons: Mapping[tuple[int, int], str] = field(default_factory=dict)
+    limits: LimitResult | None = None
 
     def __post_init__(self) -> None:
         """Own the reasons; the arrays may be the caller's."""
@@ -85,7 +88,7 @@ def nothing(name: str) -> float:
 
 def array_names() -> tuple[str, ...]:
     """Names of a result's arrays."""
-    others = ("criteria", "contacts", "reasons")
+    others = ("criteria", "contacts", "reasons", "limits")
     return tuple(f.name for f in fields(BatchResult) if f.name not in others)
 
 

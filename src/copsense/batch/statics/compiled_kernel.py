@@ -52,7 +52,7 @@ class CompiledKernel:
         from copsense.batch.statics.kernel import Out, evaluate_postures
 
         arrays: dict[str, Any] = {
-            n: a if n == "com" else _flat(a) for n, a in arrays_of(result).items()
+            n: a if n == "com" else flat(a) for n, a in arrays_of(result).items()
         }
         arguments = (*self._given, q, Out(**arrays, doubtful=doubtful))
         if self._code is None:
@@ -61,6 +61,6 @@ class CompiledKernel:
         return partial(self._code, *arguments)
 
 
-def _flat(array: np.ndarray) -> np.ndarray:
+def flat(array: np.ndarray) -> np.ndarray:
     """The same memory with one axis after posture and criterion (-1 fails on empty arrays)."""
     return array.reshape(*array.shape[:2], math.prod(array.shape[2:]))

@@ -7,7 +7,9 @@ every contact, xi one twist for all. Differentiating the criterion's condition a
     dp = xi . db + sum_i [lambda_i (dG_i - ds_i . phi_i) - nu_i ds_i . mu_i],
     nu_i = w_i tau_i,  lambda_i = -w_i s_i . mu_i      (phi_i, mu_i: sums over what joint i carries)
 
-and no derivative of an inverse. With Omega_i = xi's rotation + sum lambda_j a_j down to body i and
+and no derivative of an inverse. Where limits press, mu leaves them as they are; a torque's
+multiplier l_i adds to nu_i, the response of it to lambda_i, and that of a contact's limits to xi.
+With Omega_i = xi's rotation + sum lambda_j a_j down to body i and
 Jacobi's identity, what is left per joint is the covector
 
     dp/dq_i = dh/dq_i . (Omega_parent x g) + s_i . sum of T_j over what joint i carries,
@@ -23,7 +25,8 @@ from copsense.batch.kinematics import screw_cross
 from copsense.batch.lanes import load, splat, store
 from copsense.batch.layout import PRISMATIC, Feet, Tree
 from copsense.batch.statics.com_gains import along_motions
-from copsense.batch.statics.criteria import WEIGHTED, KernelCriteria
+from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
+from copsense.batch.statics.limit_offsets import LimitOffsets
 from copsense.batch.statics.load_sharing import across_symmetric
 from copsense.batch.statics.loops import expand, gather_groups, times_lower, times_upper
 from copsense.batch.statics.tangents import project, store_base
@@ -95,8 +98,12 @@ def torque_gradients(
     criteria: KernelCriteria,
     index: int,
     gains: bool,
+    limits: LimitOffsets | None,
 ) -> None:
-    """Gradients under a criterion of weighted torques, and wrenches."""
+    """Gradients under a criterion of weighted torques, and wrenches.
+
+    With `limits` those that press are held, whatever the criterion.
+    """
     nv = len(tree.parent) + 5
     _lever_arms(tree, feet, offset, W)
     for k in range(len(feet.body)):
@@ -105,8 +112,8 @@ def torque_gradients(
             continue
         for output in range(_outputs(feet, k, gains)):
             at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
-            _adjoint(tree, feet, offset, W, criteria, index, k, output)
-            _sweep(tree, feet, offset, W, criteria, index, at)
+            _adjoint(tree, feet, offset, W, criteria, index, k, output, limits)
+            _sweep(tree, feet, offset, W, criteria, index, at, limits)
             if output == LOAD:
                 # The motions it meets are admissible: nothing has to be projected.
                 for t in range(len(feet.support)):
@@ -153,13 +160,15 @@ def _adjoint(
     index: int,
     k: int,
     output: int,
+    limits: LimitOffsets | None,
 ) -> None:
     """mu (into `inner`) and xi (into `twist`) of one output.
 
-    mu = N z with the internal wrenches N of the unknowns: R' R z = -N' l.
+    mu = N z with the internal wrenches N of the unknowns: R' R z = -N' l. Where limits press, what
+    they leave of it: R z = P R^-T (-N' l).
     """
     ns, r, held = len(feet.support), feet.unknowns, feet.order[0]
-    weighted = criteria.kind[index] == WEIGHTED
+    weighted = criteria.kind[index] != LEAST_TORQUE
     v, w = _covector(feet, offset, W, k, output)
     for j in range(r):
         store(W, offset.unknown + j, splat(0.0))
@@ -175,6 +184,8 @@ def _adjoint(
                 store3(W, at + 3, scale3(sign, w))
     T = offset.Tw if weighted else offset.T
     times_lower(W, T, offset.unknown, r)
+    if limits is not None:
+        _leave(limits, offset, W, r)
     times_upper(W, T, offset.unknown, r)
     expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
     gather_groups(feet, W, offset.inner, offset.inner_group)
@@ -193,19 +204,46 @@ def _adjoint(
         change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
         weight = criteria.joint[index, i] if weighted else 1.0
         rate = change * (-weight)
+        if limits is not None:
+            for j in range(r):
+                response = load(W, limits.torque_response + r * t + j)
+                rate = rate + response * load(W, limits.shift + j)
         store(W, offset.rate + t, rate)
         if feet.member[feet.group[t], held]:
             w = sub3(w, scale3(rate, load3(W, s + 3)))
+    if limits is not None:
+        for j in range(r):
+            response = load3(W, limits.twist_response + 3 * j)
+            w = add3(w, scale3(load(W, limits.shift + j), response))
     store3(W, offset.twist, w)  # of xi only the rotation matters: gravity is the same everywhere
 
 
 @compiled
+def _leave(limits: LimitOffsets, offset: Offsets, W: Any, r: int) -> None:
+    """Of a gradient along x, what the pressing limits leave; the gradient is kept as `shift`."""
+    for j in range(r):
+        store(W, limits.shift + j, load(W, offset.unknown + j))
+    for i in range(r):
+        s = load(W, limits.P + r * i) * load(W, limits.shift)
+        for j in range(1, r):
+            s = s + load(W, limits.P + r * i + j) * load(W, limits.shift + j)
+        store(W, offset.unknown + i, s)
+
+
+@compiled
 def _sweep(
-    tree: Tree, feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int, at: int
+    tree: Tree,
+    feet: Feet,
+    offset: Offsets,
+    W: Any,
+    criteria: KernelCriteria,
+    index: int,
+    at: int,
+    limits: LimitOffsets | None,
 ) -> None:
     """One output's gradient (nv,) at row `at`, base in world axes, not yet projected."""
     ns = len(feet.support)
-    weighted = criteria.kind[index] == WEIGHTED
+    weighted = criteria.kind[index] != LEAST_TORQUE
     g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
     base = load3(W, offset.twist)
     store_base(tree, offset, W, at, cross3(base, g))
@@ -222,6 +260,8 @@ def _sweep(
         nu = load(W, offset.torque + i)
         if weighted:
             nu = nu * criteria.joint[index, i]
+        if limits is not None:
+            nu = nu + load(W, limits.pressing + t)
         A = offset.lever_arm + 6 * t
         F = scale3(-1.0, add3(scale3(rate, load3(W, A)), scale3(nu, F)))
         M = scale3(-1.0, add3(scale3(rate, load3(W, A + 3)), scale3(nu, M)))

@@ -89,7 +89,7 @@ def evaluate_postures(
             else:
                 least_squares(feet, offset, W, criteria, index)
                 finish(tree, feet, offset, W)
-                torque_gradients(tree, feet, offset, W, criteria, index, gains)
+                torque_gradients(tree, feet, offset, W, criteria, index, gains, None)
             if gains:
                 com_gains(feet, offset, W, nv)
             margins(feet, offset, W, gains)

@@ -20,7 +20,7 @@ import numpy as np
 from copsense.batch.compiler import compiled
 from copsense.batch.lanes import load, magnitude, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
-from copsense.batch.statics.criteria import WEIGHTED, KernelCriteria
+from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
 from copsense.batch.statics.loops import (
     expand,
     factorise,
@@ -92,7 +92,7 @@ def least_squares(
 ) -> None:
     """Wrenches of least weighted torque, and of least cost where the wrenches count too."""
     ns, r = len(feet.support), feet.unknowns
-    weighted = criteria.kind[index] == WEIGHTED
+    weighted = criteria.kind[index] != LEAST_TORQUE
     # Torques that the held contacts alone would leave: tau_0 = G - D b.
     for t in range(ns):
         tau = load(W, offset.gravity + feet.support[t])

@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch.statics.batch_result import BatchResult, array_names, nothing
+from copsense.batch.statics.limit_reference import solve_limited
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
-from copsense.sensitivity import cop_sensitivity
+from copsense.sensitivity import cop_sensitivity, sensitivity_of
 from copsense.stance import Stance
 from copsense.statics import WrenchPolicy
 
@@ -29,7 +30,13 @@ def fill_row(
     try:
         here = stance.at(q, check=False)
         result.com[row] = here.com
-        found = cop_sensitivity(stance.at(q), criterion)
+        if result.limits is None:
+            found = cop_sensitivity(stance.at(q), criterion)
+        else:
+            assert isinstance(criterion, Criterion)
+            found = sensitivity_of(
+                solve_limited(stance.at(q), criterion, result.limits, row, column)
+            )
         values = {
             "wrenches": found.equilibrium.wrenches,
             "torques": found.equilibrium.torques,

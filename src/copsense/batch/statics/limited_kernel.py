@@ -1,0 +1,334 @@
+"""Limited kernel: postures that a criterion's own wrenches take to a limit, solved within limits.
+
+It follows the kernel without limits and takes its results. Where no limit is near they stand;
+elsewhere postures are gathered, a few abreast, and solved within the limits. What a posture gets
+does not depend on the others.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from copsense.batch.compiler import compiled, entry, from_array
+from copsense.batch.kinematics import move, place_feet
+from copsense.batch.lanes import get, load, store
+from copsense.batch.layout import Feet, Tree
+from copsense.batch.statics.active_set import (
+    EXACT,
+    INFEASIBLE,
+    Programs,
+    measure,
+    nearest,
+    optimum,
+    relax,
+)
+from copsense.batch.statics.com_gains import com_gains, com_motions, margins
+from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
+from copsense.batch.statics.gradients import torque_gradients
+from copsense.batch.statics.inertia import factorise_inertia
+from copsense.batch.statics.kernel import Out
+from copsense.batch.statics.kernel_limits import KernelLimits
+from copsense.batch.statics.limit_offsets import LimitOffsets
+from copsense.batch.statics.limit_outputs import LimitOut, begin_row, row_margins, write_lane
+from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNLOADED
+from copsense.batch.statics.limited_statics import (
+    TOUCHING,
+    gradient_size,
+    keep_pressing,
+    move_unknowns,
+    read_program,
+    unlimited,
+    violation,
+    write_maps,
+    write_responses,
+    write_scales,
+)
+from copsense.batch.statics.load_sharing import finish, least_squares, set_load
+from copsense.batch.statics.loops import build
+from copsense.batch.statics.tangents import span
+from copsense.batch.transfer import read_postures
+from copsense.batch.vectors import along, load3, store3
+from copsense.batch.workspace import WIDTH, Offsets
+
+_offsets, _limit_offsets = from_array(Offsets), from_array(LimitOffsets)
+
+_NO_LOAD = 0.5e-9  # share of the weight that is none, well under what the reference calls none
+_PROVEN = 1e-8  # violation of an optimality condition above which the reference answers
+_DEMANDS = 1e-9  # multiplier of a row that demands that all be relaxed, as in `Program`
+
+
+class Pack(NamedTuple):
+    """Memory for the postures in hand.
+
+    Attributes:
+        queue: postures that are to be solved (block,).
+        candidate: whether a limit is near (block, nk).
+        q: configurations of those abreast (`WIDTH`, nq).
+        pressed: rows that press, of each of them; -1 where nothing has to be done, -2 where the
+            reference must (`WIDTH`,).
+        held: these rows (`WIDTH`, m).
+        u: their multipliers (`WIDTH`, m).
+    """
+
+    queue: np.ndarray
+    candidate: np.ndarray
+    q: np.ndarray
+    pressed: np.ndarray
+    held: np.ndarray
+    u: np.ndarray
+
+
+@entry
+def limit_postures(
+    tree: Tree,
+    feet: Feet,
+    criteria: KernelCriteria,
+    rows: KernelLimits,
+    offsets: Any,
+    limit_offsets: Any,
+    q: Any,
+    out: Out,
+    found: LimitOut,
+    W: Any,
+    p: Programs,
+    pack: Pack,
+    start: int,
+    stop: int,
+) -> bool:
+    """Put the results of postures start to stop within the limits; whether any is in doubt."""
+    offset, limits = _offsets(offsets), _limit_offsets(limit_offsets)
+    doubt, waiting = False, 0
+    moving, gains = feet.held == 1, len(out.com_gain) > 0
+    for row in range(start, stop):
+        near = False
+        for index in range(len(criteria.kind)):
+            column = criteria.column[index]
+            doubtful = out.doubtful[row, column] != 0
+            pack.candidate[row - start, index] = 0
+            if not doubtful and begin_row(feet, rows, out, found, p.slack, row, column):
+                pack.candidate[row - start, index] = 1
+                near = True
+            doubt = doubt or doubtful
+        if near:
+            pack.queue[waiting] = row
+            waiting += 1
+    for first in range(0, waiting, WIDTH):
+        count = min(WIDTH, waiting - first)
+        for lane in range(count):
+            for i in range(q.shape[1]):
+                pack.q[lane, i] = q[pack.queue[first + lane], i]
+        read_postures(W, offset.q, pack.q, 0, count)
+        move(tree, offset, W)
+        place_feet(feet, offset, W)
+        build(feet, offset, W)
+        set_load(tree, offset, W)
+        write_scales(feet, offset, limits, W)
+        if moving:
+            span(feet, offset, W)
+        if gains and moving:
+            factorise_inertia(tree, offset, W)
+            com_motions(tree, feet, offset, W)
+        for index in range(len(criteria.kind)):
+            store(W, offset.doubt, load(W, offset.flag))
+            least_squares(feet, offset, W, criteria, index)
+            store(W, limits.lost, load(W, offset.doubt))
+            finish(tree, feet, offset, W)
+            write_maps(feet, offset, limits, W, criteria, index)
+            unlimited(feet, limits, W)
+            some = False
+            for lane in range(count):
+                row = pack.queue[first + lane]
+                pack.pressed[lane] = -1
+                if pack.candidate[row - start, index]:
+                    _settle(
+                        feet, offset, limits, rows, W, lane, row, criteria, index, p, pack, found
+                    )
+                    if pack.pressed[lane] > 0:
+                        some = True
+                    elif pack.pressed[lane] < -1:
+                        out.doubtful[row, criteria.column[index]] = 1
+                        doubt = True
+            if not some:
+                continue
+            move_unknowns(feet, offset, limits, W, criteria, index)
+            store(W, offset.doubt, load(W, limits.lost))
+            finish(tree, feet, offset, W)
+            torque_gradients(tree, feet, offset, W, criteria, index, gains, limits)
+            nv = len(tree.parent) + 5
+            if gains:
+                com_gains(feet, offset, W, nv)
+            margins(feet, offset, W, gains)
+            for output in range(2 * len(feet.body)):
+                at = offset.gradient + nv * output
+                store3(W, at, along(W, offset.rotation, load3(W, at)))
+                store3(W, at + 3, along(W, offset.rotation, load3(W, at + 3)))
+            for lane in range(count):
+                if pack.pressed[lane] > 0:
+                    row, column = pack.queue[first + lane], criteria.column[index]
+                    good = _conclude(
+                        feet, offset, limits, rows, W, lane, row, criteria, index, p, pack, found
+                    )
+                    write_lane(feet, offset, W, lane, row, column, out, nv, gains)
+                    row_margins(feet, rows, out, found.margins, p.slack, row, column)
+                    if not good:
+                        out.doubtful[row, column] = 1
+                        doubt = True
+    return doubt
+
+
+@compiled
+def _settle(
+    feet: Feet,
+    offset: Offsets,
+    limits: LimitOffsets,
+    rows: KernelLimits,
+    W: Any,
+    lane: int,
+    row: int,
+    criteria: KernelCriteria,
+    index: int,
+    p: Programs,
+    pack: Pack,
+    found: LimitOut,
+) -> None:
+    """The active set of one posture, into its lane; `pack.pressed` is -2 if it was not found."""
+    r, column = feet.unknowns, criteria.column[index]
+    pack.pressed[lane] = -2
+    if get(W, limits.lost, lane) != 0.0:
+        return
+    read_program(feet, offset, limits, rows, W, lane, p)
+    most, fixed = 0.0, -1
+    for i in feet.rest:  # torques that no wrench changes
+        over = abs(get(W, offset.torque + i, lane)) - rows.torque[i]
+        if over > most:
+            most, fixed = over, i
+    stuck = fixed >= 0 and most > TOUCHING * feet.weight
+    q = nearest(rows, p, r, False, EXACT * feet.weight)
+    if q == INFEASIBLE or (q >= 0 and stuck):
+        found.state[row, column] = IMPOSSIBLE
+        if found.relaxation[row] > 0.0:
+            pack.pressed[lane] = -1
+            return
+        if not stuck:
+            most = 0.0
+        if q == INFEASIBLE:
+            q = relax(rows, p, r + 1, feet.weight)
+            if q < 0:
+                return
+            if p.x[r] > most:
+                fixed, most = -1, p.x[r]
+                k = 0
+                for c in range(q):
+                    if p.u[c] > _DEMANDS:
+                        found.conflict[row, k] = _public(feet, rows, p.held[c])
+                        k += 1
+        if fixed >= 0 and stuck:
+            found.conflict[row, 0] = rows.row[fixed]
+            if get(W, offset.torque + fixed, lane) < 0.0:
+                found.conflict[row, 0] += 1
+        if most > TOUCHING * feet.weight:
+            found.relaxation[row] = most
+            pack.pressed[lane] = -1
+        return
+    if q < 0:
+        return
+    optimum(p, r, q)
+    measure(rows, p, r, False)
+    size = gradient_size(feet, offset, W, lane, criteria, index, p)
+    q = keep_pressing(p, r, q, size)
+    found.touching[row, column] = _touching(feet, offset, rows, W, lane, p, p.held, q)
+    pack.pressed[lane] = q
+    if q == 0:
+        pack.pressed[lane] = -1
+        return
+    found.state[row, column] = PRESSED
+    write_responses(feet, offset, limits, rows, W, lane, p, q)
+    unit = criteria.joint[index, 1] if criteria.kind[index] == LEAST_TORQUE else 1.0
+    for k in range(q):
+        pack.held[lane, k], pack.u[lane, k] = p.held[k], p.u[k]
+        found.pressing[row, column, k] = _public(feet, rows, p.held[k])
+        found.multipliers[row, column, k] = unit * p.u[k]
+
+
+@compiled
+def _touching(
+    feet: Feet,
+    offset: Offsets,
+    rows: KernelLimits,
+    W: Any,
+    lane: int,
+    p: Programs,
+    held: Any,
+    q: int,
+) -> int:
+    """How many rows are on their bounds and do not press."""
+    touching, tolerance = 0, TOUCHING * feet.weight
+    for i in range(len(p.slack)):
+        if p.slack[i] * p.inverse[i] <= tolerance:
+            touching += 1
+            for k in range(q):
+                if held[k] == i:
+                    touching -= 1
+    for i in feet.rest:
+        torque = get(W, offset.torque + i, lane)
+        for sign in (1.0, -1.0):
+            if rows.row[i] >= 0 and rows.torque[i] - sign * torque <= tolerance:
+                touching += 1
+    return touching
+
+
+@compiled
+def _public(feet: Feet, rows: KernelLimits, row: int) -> int:
+    """A row's place in `LimitRows.all_names`."""
+    rc = len(rows.bound)
+    if row < rc:
+        return row
+    return rows.row[feet.support[(row - rc) // 2]] + (row - rc) % 2
+
+
+@compiled
+def _conclude(
+    feet: Feet,
+    offset: Offsets,
+    limits: LimitOffsets,
+    rows: KernelLimits,
+    W: Any,
+    lane: int,
+    row: int,
+    criteria: KernelCriteria,
+    index: int,
+    p: Programs,
+    pack: Pack,
+    found: LimitOut,
+) -> bool:
+    """Verify an optimum, as it came out; note contacts without load. Whether it can be believed."""
+    column, q = criteria.column[index], pack.pressed[lane]
+    error = violation(
+        feet,
+        offset,
+        limits,
+        rows,
+        W,
+        lane,
+        criteria,
+        index,
+        p,
+        pack.held[lane],
+        pack.u[lane],
+        q,
+    )
+    found.optimality[row, column] = error
+    if get(W, offset.doubt, lane) != 0.0:
+        if get(W, limits.lost, lane) != 0.0:
+            return False
+        bits = 0
+        for k in range(len(feet.body)):
+            if abs(p.now[6 * k + 2]) < _NO_LOAD * feet.weight:
+                bits |= 1 << k
+        found.unloaded[row, column] = bits
+        found.state[row, column] = UNLOADED
+        if bits == 0:
+            return False
+    return error <= _PROVEN

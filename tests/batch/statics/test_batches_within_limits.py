@@ -1,0 +1,221 @@
+"""A batch within limits gives what the reference gives within them, posture by posture."""
+
+import importlib.util
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from support.grounds import off_centre, with_hand
+from support.random_cases import Case
+from support.raw_qp import raw_problem
+from support.stances import CASES, postures, served
+
+import copsense
+from copsense import Limits
+from copsense.batch import BatchKernel, evaluate_batch
+from copsense.batch.statics.batch_result import arrays_of
+from copsense.batch.statics.limit_result import limit_arrays
+from copsense.errors import InfeasibleError, UnloadedContactError
+from copsense.margins import limit_margins
+
+RELATIVE = 1e-9
+PER_CASE = 6  # times four criteria, ten cases; benchmarks/equality.py has 10 000 postures
+WITHIN, PRESSED, INFEASIBLE, UNLOADED = range(4)
+
+
+def tight(stance, q, share=0.5):
+    """Limits that press on about half of these postures, of every kind."""
+    own = BatchKernel(stance, served(stance), gains=False).evaluate(q)
+    f = own.wrenches
+    slip = np.hypot(f[..., 0], f[..., 1]) / np.abs(f[..., 2])
+    return Limits(
+        friction=float(np.quantile(slip.max(axis=-1), share)) + 0.02,
+        torque=float(np.quantile(np.abs(own.torques).max(axis=-1), share)),
+        torsion=0.02,
+        cop_margin=0.005,
+    )
+
+
+def differs(given, expected, floor):
+    """Largest difference, relative to the largest entry expected."""
+    finite = np.isfinite(expected)
+    assert np.array_equal(given[~finite], expected[~finite])
+    size = max(float(np.abs(expected[finite]).max(initial=0.0)), floor)
+    return float(np.abs(given[finite] - expected[finite]).max(initial=0.0)) / size
+
+
+def reference_answer(stance, criterion, limits):
+    """What the reference says, or the error that it raises."""
+    try:
+        return copsense.cop_sensitivity(stance, criterion, limits), None
+    except copsense.CopsenseError as error:
+        return None, error
+
+
+@pytest.fixture(scope="module")
+def answers(case):
+    """Of a case: its stance, configurations, limits, and what the kernel answers."""
+    made = {}
+
+    def get(name):
+        if name not in made:
+            stance = case(name)
+            q = postures(stance, PER_CASE, seed=4)
+            limits = tight(stance, q)
+            kernel = BatchKernel(stance, served(stance), limits)
+            assert not kernel.fallback_reason
+            made[name] = stance, q, limits, kernel.evaluate(q)
+        return made[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_kernel_equals_the_reference_within_limits(answers, name):
+    stance, q, limits, found = answers(name)
+    within = found.limits
+    seen = np.zeros(4, dtype=int)
+    for (i, j), criterion in zip(np.ndindex(len(q), 4), served(stance) * len(q), strict=True):
+        state = within.state[i, j]
+        seen[state] += 1
+        expected, error = reference_answer(stance.at(q[i]), criterion, limits)
+        if isinstance(error, InfeasibleError):
+            assert state == INFEASIBLE
+            assert within.relaxation[i] == pytest.approx(error.violation, rel=1e-9)
+            assert found.reasons[i, j].startswith(str(error)[:60])
+            continue
+        if isinstance(error, UnloadedContactError):
+            assert state == UNLOADED
+            assert found.reasons[i, j] == str(error)
+            continue
+        assert error is None
+        equilibrium = expected.equilibrium
+        pairs = {
+            "wrenches": equilibrium.wrenches,
+            "torques": equilibrium.torques,
+            "cops": expected.cop,
+            "gradient": expected.gradient,
+            "com_gain": expected.com_gain,
+            "com_travel": expected.com_travel,
+            "load_share": equilibrium.wrenches[:, 2] / stance.robot.weight,
+        }
+        for what, value in pairs.items():
+            error = differs(getattr(found, what)[i, j], value, floor=1e-3)
+            assert error < RELATIVE, (what, i, criterion.name, error)
+        assert np.array_equal(found.tipping_edge[i, j], expected.tipping_edge)
+        assert state == (PRESSED if len(equilibrium.pressing) else WITHIN)
+        pressing = within.pressing[i, j]
+        assert set(pressing[pressing >= 0]) == set(equilibrium.pressing)
+        multipliers = np.zeros(len(within.names))
+        multipliers[pressing[pressing >= 0]] = within.multipliers[i, j][pressing >= 0]
+        assert differs(multipliers, equilibrium.row_multipliers, floor=1e-6) < RELATIVE
+        named = [(a.name, a.kind) for a in within.active(i, j)]
+        assert named == [(a.name, a.kind) for a in equilibrium.active if not a.weak]
+        assert within.touching[i, j] == sum(a.weak for a in equilibrium.active)
+        assert 0 <= within.optimality[i, j] < 1e-8
+        unlimited = copsense.solve_equilibrium(stance.at(q[i]), criterion)
+        for margins, of in ((within.margins, equilibrium), (within.own_margins, unlimited)):
+            own = limit_margins(of, limits)
+            assert [(m.where, m.kind) for m in own] == list(within.margin_names)
+            np.testing.assert_allclose(margins[i, j], [m.value for m in own], rtol=0, atol=1e-9)
+    assert seen[PRESSED] > 2
+
+
+@pytest.mark.parametrize("name", ["icub", "talos on slopes", "icub, three surfaces"])
+def test_rows_are_infeasible_where_a_linear_program_says_so(case, name):
+    # The same limits from raw data of robot and soles, forces and torques as variables.
+    stance = case(name)
+    q = postures(stance, 25, seed=5)
+    limits = tight(stance, q, share=0.35)
+    found = BatchKernel(stance, served(stance)[:1], limits, gains=False).evaluate(q).limits
+    n, m = len(stance.robot.torque_names), len(stance.component_index)
+    agreed = set()
+    for i, row in enumerate(q):
+        cost = np.eye(n), np.eye(m), np.zeros(m)  # which the linear program does not look at
+        raw = raw_problem(Case(stance.at(row), served(stance)[0], limits, *cost))
+        free = [(None, None)] * len(raw.c)
+        solved = linprog(0 * raw.c, raw.C, raw.d, raw.E, raw.e, free)
+        assert solved.status in (0, 2)
+        assert (found.state[i, 0] == INFEASIBLE) == (solved.status == 2)
+        assert (found.relaxation[i] > 0) == (solved.status == 2)
+        agreed.add(solved.status)
+    assert name != "icub" or agreed == {0, 2}
+
+
+def same_bits(a, b):
+    arrays = [arrays_of(r) | limit_arrays(r.limits) for r in (a, b)]
+    for what, value in arrays[0].items():
+        np.testing.assert_array_equal(value, arrays[1][what], err_msg=what)
+
+
+def test_a_row_does_not_depend_on_the_others(answers, case):
+    stance, q, limits, found = answers("icub, three surfaces")
+    kernel = BatchKernel(stance, served(stance), limits)
+    same_bits(kernel.evaluate(q, threads=2), found)
+    back = kernel.evaluate(np.ascontiguousarray(q[::-1]))
+    for what, value in (arrays_of(back) | limit_arrays(back.limits)).items():
+        expected = (arrays_of(found) | limit_arrays(found.limits))[what]
+        np.testing.assert_array_equal(value[::-1], expected, err_msg=what)
+    for i in range(len(q)):
+        single = kernel.one(q[i])
+        expected = kernel.evaluate(q[i : i + 1])
+        same_bits(single, expected)
+    out = kernel.evaluate(np.ascontiguousarray(q[::-1]))
+    same_bits(kernel.evaluate(q, out=out), found)
+
+
+def test_a_hand_that_would_have_to_pull_is_left_without_load(icub):
+    # The wall is on the wrong side of the hand: all that limits leave it is nothing.
+    stance = with_hand(off_centre(icub), "l_hand", (1, -0.2, -0.1))
+    friction = dict.fromkeys(stance.contact_names[:2], 0.6) | {"hand": 0.05}
+    limits = Limits(friction=friction, cop_margin=None)
+    q = postures(stance, 4, seed=1, size=0.05)
+    criteria = served(stance)
+    found = evaluate_batch(stance, q, criteria, limits)
+    states = set()
+    for i, j in np.ndindex(len(q), 4):
+        states.add(int(found.limits.state[i, j]))
+        _, error = reference_answer(stance.at(q[i]), criteria[j], limits)
+        assert isinstance(error, UnloadedContactError | None)
+        assert found.reasons.get((i, j), "") == str(error or "")
+        assert (found.limits.state[i, j] == UNLOADED) == (error is not None)
+        assert np.isnan(found.wrenches[i, j]).all() == (error is not None)
+    assert UNLOADED in states
+
+
+def test_without_numba_the_reference_answers_within_limits_too(answers, monkeypatch):
+    stance, q, limits, found = answers("icub")
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "numba" else find(name)
+    )
+    kernel = BatchKernel(stance, served(stance), limits)
+    assert "copsense[fast]" in kernel.fallback_reason
+    alone = kernel.evaluate(q)
+    np.testing.assert_array_equal(alone.limits.state, found.limits.state)
+    np.testing.assert_allclose(alone.torques, found.torques, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(alone.limits.margins, found.limits.margins, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(alone.limits.relaxation, found.limits.relaxation, rtol=0, atol=1e-8)
+    assert alone.reasons.keys() == found.reasons.keys()
+    for i, j in np.ndindex(alone.limits.state.shape):
+        assert set(alone.limits.pressing[i, j]) == set(found.limits.pressing[i, j])
+
+
+def test_policies_take_no_limits(case):
+    stance = case("icub")
+
+    def own(q):
+        return copsense.solve_equilibrium(stance.at(q), copsense.minimum_torque()).wrenches
+
+    with pytest.raises(copsense.errors.InvalidInputError, match="policy 'own'"):
+        BatchKernel(stance, [own], Limits(friction=0.5))
+
+
+def test_results_to_overwrite_have_to_be_within_the_same_limits(case):
+    stance = case("icub")
+    kernel = BatchKernel(stance, served(stance), Limits(friction=0.5))
+    other = BatchKernel(stance, served(stance), Limits(friction=0.4))
+    free = BatchKernel(stance, served(stance))
+    for out, words in ((other.empty(1), r"out\.limits"), (free.empty(1), "with limits")):
+        with pytest.raises(copsense.errors.InvalidInputError, match=words):
+            kernel.evaluate(stance.q[None], out=out)
