@@ -117,7 +117,12 @@ class Kkt:
                 raise UndeterminedWrenchError(
                     "the contacts lose rank at this very posture: the wrenches have no derivative "
                     "here. "
-                    + (f"No motor holds {', '.join(loose)}. " if loose else "")
+                    + (
+                        f"No motor holds {', '.join(loose)}: fix them by --lock, or by a coupling "
+                        "of ratio 0 (--couple JOINT=0*OTHER+POSITION). "
+                        if loose
+                        else ""
+                    )
                     + (f"{lacking[0].upper()}{lacking[1:]}. " if lacking else "")
                     + "Move the posture off the singularity: bend a leg that is straight, and put "
                     "legs that stand exactly parallel a little apart or together (width=, --width)."
