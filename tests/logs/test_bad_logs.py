@@ -1,6 +1,8 @@
 """Logs that cannot be meant: one clear error, or a named gap."""
 
+import importlib.util
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -343,25 +345,31 @@ def whole_files(data, sway_file, tmp_path_factory):
     return found
 
 
-def test_files_cut_short_or_damaged_are_one_clear_error(whole_files, icub, tmp_path):
-    rng = np.random.default_rng(7)
+def test_files_cut_short_are_one_clear_error(whole_files, icub, tmp_path):
     contacts = ("l_sole", "r_sole")
     for name, content in whole_files.items():
         path, size = tmp_path / name, len(content)
-        cases = [content[: int(size * share)] for share in (0.05, 0.4, 0.8, 0.99)]
-        for _ in range(2 if name in APART else 6):
-            broken = bytearray(content)
-            for at in rng.integers(0, size, 20):
-                broken[at] = rng.integers(256)
-            cases.append(bytes(broken))
-        refused = 0
-        for case in cases:
-            path.write_bytes(case)
+        rejected = 0
+        for share in (0.05, 0.4, 0.8, 0.99):
+            path.write_bytes(content[: int(size * share)])
             try:
                 read_log(path, robot=icub.robot, contacts=contacts)
             except CopsenseError:  # and no other error
-                refused += 1
-        assert refused or name.endswith("csv"), name
+                rejected += 1
+        assert rejected or name.endswith("csv"), name
+
+
+def test_damaged_files_are_rejected_in_words_or_read_as_far_as_they_go(whole_files, icub):
+    """A short run of benchmarks/log_mutations.py."""
+    path = Path(__file__).parents[2] / "benchmarks" / "log_mutations.py"
+    spec = importlib.util.spec_from_file_location("log_mutations", path)
+    mutations = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(mutations)
+    for name in whole_files:
+        count = 2 if name in APART else 7  # none through the command, which takes longer
+        counts, bad = mutations.run(name, whole_files, count, 1, icub.robot)
+        assert not bad
+        assert counts["accepted"] + counts["rejected"] == count
 
 
 def test_files_that_are_no_logs(tmp_path):
@@ -386,6 +394,34 @@ def test_the_command_says_one_line(tmp_path):
     assert "--map" in command("log", path, "--robot", "icub").error
     assert "no log at" in command("log", tmp_path / "b.csv", "--robot", "icub").error
     assert "no mapping at" in command("log", path, "--robot", "icub", "--map", "none.toml").error
+
+
+def test_a_mapping_is_written_by_a_comparison_that_succeeds_alone(tmp_path):
+    import pandas as pd
+
+    kept, path = tmp_path / "kept.toml", tmp_path / "a.csv"
+    run = ("log", path, "--robot", "icub", "--save-map", kept)
+    table = columns()
+    pd.DataFrame(table).to_csv(path, index=False)
+    assert "error" in command(*run).err  # the legs' other joints are not there
+    assert not kept.exists()
+    robot = copsense.load_stance("icub").robot
+    table = dict.fromkeys(robot.joint_names, table["l_knee"]) | table
+    table["r_sole_fz"] = table["l_sole_fz"]
+    pd.DataFrame(table).to_csv(path, index=False)
+    answer = command(*run, "--skip", "0", "--json")
+    assert answer.code == 0, answer.err
+    assert LogMap.load(kept) is not None
+
+
+def test_a_log_shorter_than_a_tenth_of_a_second_has_no_slopes(tmp_path, made, icub):
+    short = replace(
+        made,
+        times=made.times / 50,
+        positions=made.positions,
+    )
+    found = compare_log(short, icub, skip=0.0)
+    assert found.sway.method == "regression"
 
 
 @pytest.mark.parametrize(("name", "remedy"), [("v5.mat", "-v7.3"), ("plates.c3d", "markers")])

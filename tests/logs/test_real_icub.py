@@ -43,6 +43,14 @@ def test_minimum_torque_in_motion_is_inside_the_interval(answer):
     assert not low < load["minimum-wrench, in motion"]["value"] < high
 
 
+def test_the_hips_weight_in_shares_of_the_ankles_is_in_the_answer(answer):
+    """Scripts of their own read 1.10 [0.98, 1.23]; docs/logs.md says what stands between."""
+    hips = answer["hip_ankle_weight_ratio"]
+    assert hips["state"] == "identified"
+    assert hips["value"] == pytest.approx(1.10, abs=0.03)
+    assert (hips["low"], hips["high"]) == pytest.approx((0.98, 1.23), abs=0.03)
+
+
 def test_what_the_log_lacks_is_said(answer):
     kinds = {finding["kind"] for finding in answer["findings"]}
     assert {"clock", "total", "offset"} <= kinds

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import click
 
-from copsense.cli.log_options import encoders_option, log_options, read_shown, read_subject
+from copsense.cli.log_options import (
+    encoders_option,
+    log_options,
+    rate_option,
+    read_shown,
+    read_subject,
+)
 from copsense.cli.printing import echo_json, echo_notes, progress_bar
 from copsense.cli.units import read_quantity
 
@@ -33,6 +39,7 @@ from copsense.cli.units import read_quantity
     help="The log's beginning, which is left out.",
 )
 @encoders_option
+@rate_option
 @click.option(
     "--postures",
     type=click.IntRange(min=20),
@@ -51,6 +58,7 @@ def identify(
     at_rest: bool,
     skip: str,
     encoders: str | None,
+    rate: str | None,
     postures: int,
     as_json: bool,
 ) -> None:
@@ -66,7 +74,7 @@ def identify(
     after = read_quantity(skip, "s")
     spread = 0.0 if encoders is None else read_quantity(encoders, "rad")
     subject = read_subject(robot, contacts, package_dirs)
-    log = read_shown(file, map_file, subject)
+    log = read_shown(file, map_file, subject, rate)
     with progress_bar(None, "identifying", "row") as advance:
         found = identify_log(
             log,

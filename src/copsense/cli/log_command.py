@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import shlex
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
-from copsense.cli.log_options import encoders_option, log_options, read_shown, read_subject
+from copsense.cli.log_options import (
+    encoders_option,
+    log_options,
+    rate_option,
+    read_shown,
+    read_subject,
+)
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.units import read_quantity
-from copsense.errors import InvalidInputError
+from copsense.errors import CopsenseError, InvalidInputError
+
+if TYPE_CHECKING:
+    from copsense.cli.log_options import LogSubject
+    from copsense.logs import Log, LogMap
 
 
 @click.command(
@@ -23,7 +34,11 @@ from copsense.errors import InvalidInputError
     "  copsense log run.csv --robot icub --save-map run.toml"
 )
 @log_options
-@click.option("--save-map", metavar="MAP.toml", help="Write down what was recognised, and use it.")
+@click.option(
+    "--save-map",
+    metavar="MAP.toml",
+    help="Write down what was recognised, and use it; not after an error.",
+)
 @criterion_options
 @click.option(
     "--base",
@@ -40,11 +55,7 @@ from copsense.errors import InvalidInputError
     help="The log's beginning, which is left out of the slopes.",
 )
 @encoders_option
-@click.option(
-    "--rate",
-    metavar="FREQUENCY",
-    help="Rows a second, each the mean of the samples around it, such as 100Hz; default all.",
-)
+@rate_option
 @click.option(
     "--postures",
     type=click.IntRange(min=20),
@@ -104,15 +115,13 @@ def log(
         check_report_folder(report, overwrite=force)
     after = read_quantity(skip, "s")
     spread = 0.0 if encoders is None else read_quantity(encoders, "rad")
-    hertz = None if rate is None else read_quantity(rate, "Hz")
     chosen = read_criteria(criteria, characteristic_length)
     subject = read_subject(robot, contacts, package_dirs)
     echo_notes(subject.robot.notes)
+    mapping: str | LogMap | None = map_file
     if save_map is not None:
-        recognise(open_log_file(file), subject.robot, subject.wanted).save(
-            save_map, overwrite=force
-        )
-    found = read_shown(file, save_map or map_file, subject, hertz)
+        mapping = recognise(open_log_file(file), subject.robot, subject.wanted)
+    found = read_shown(file, mapping, subject, rate)
     with progress_bar(min(postures, len(found.times)), "comparing") as advance:
         comparison = compare_log(
             found,
@@ -125,6 +134,8 @@ def log(
             encoders=spread,
             advance=advance,
         )
+    if save_map is not None and not isinstance(mapping, str | None):
+        mapping.save(save_map, overwrite=force)  # only now: an error leaves nothing behind
     if picture is not None:
         from copsense.plots import save_figure
 
@@ -136,10 +147,27 @@ def log(
     if as_json:
         places = (("plot", picture), ("map", save_map), ("report", page))
         written = {k: v for k, v in places if v is not None}
-        echo_json(comparison.to_dict() | written)
+        echo_json(
+            comparison.to_dict()
+            | {"hip_ankle_weight_ratio": _hips(found, subject, after, spread)}
+            | written
+        )
         return
     click.echo(str(comparison))
     for finding in comparison.findings:
         click.echo(f"found: {finding.message}")
     echo_notes(comparison.notes)
     echo_written(picture, save_map, page)
+
+
+def _hips(log: Log, subject: LogSubject, skip: float, encoders: float) -> dict[str, object] | None:
+    """The weight of the hips in shares of the ankles', in motion; None where nothing says it."""
+    from copsense.identification import hip_ankle_ratio
+
+    try:
+        found = hip_ankle_ratio(
+            log, subject.robot, contacts=subject.feet, skip=skip, encoders=encoders
+        )
+    except CopsenseError:
+        return None
+    return {**vars(found)}

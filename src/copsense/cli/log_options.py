@@ -9,9 +9,11 @@ import click
 
 from copsense.cli.option_lists import F, package_dirs_option, with_options
 from copsense.cli.printing import progress_bar
+from copsense.cli.units import read_quantity
 
 if TYPE_CHECKING:
     from copsense.contact import Contact
+    from copsense.logs import LogMap
     from copsense.logs.log import Log
     from copsense.robot import Robot
 
@@ -50,6 +52,15 @@ def encoders_option(command: F) -> F:
     )(command)
 
 
+def rate_option(command: F) -> F:
+    """The option --rate."""
+    return click.option(
+        "--rate",
+        metavar="FREQUENCY",
+        help="Rows a second, each the mean of the samples around it, such as 100Hz; default all.",
+    )(command)
+
+
 class LogSubject(NamedTuple):
     """Whose log a command reads.
 
@@ -82,14 +93,15 @@ def read_subject(
 
 
 def read_shown(
-    file: str, map_file: str | None, subject: LogSubject, rate: float | None = None
+    file: str, mapping: str | LogMap | None, subject: LogSubject, rate: str | None
 ) -> Log:
-    """The log, with a bar while it is read."""
+    """The log, with a bar while it is read; rate as `rate_option` gives it."""
     from copsense.logs import read_log
 
     path = Path(file)
+    hertz = None if rate is None else read_quantity(rate, "Hz")
     size = path.stat().st_size if path.is_file() else None
     with progress_bar(size, f"reading {path.name}", "B") as advance:
         return read_log(
-            file, map_file, robot=subject.robot, contacts=subject.wanted, rate=rate, advance=advance
+            file, mapping, robot=subject.robot, contacts=subject.wanted, rate=hertz, advance=advance
         )

@@ -2,7 +2,11 @@
 
 from copsense.identification.fitting import fit_family
 from copsense.identification.identifying import Identification, identify
-from copsense.identification.log_identification import identify_log, log_measurements
+from copsense.identification.log_identification import (
+    hip_ankle_ratio,
+    identify_log,
+    log_measurements,
+)
 from copsense.identification.measurements import EncoderErrors, Measurements
 from copsense.identification.parameter_fit import Estimate, ParameterFit
 
@@ -13,6 +17,7 @@ __all__ = [
     "Measurements",
     "ParameterFit",
     "fit_family",
+    "hip_ankle_ratio",
     "identify",
     "identify_log",
     "log_measurements",

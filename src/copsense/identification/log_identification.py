@@ -11,11 +11,13 @@ from jaxtyping import Int
 
 from copsense.arrays import check_type, finite_number, whole_number
 from copsense.contact import Contact
-from copsense.design import Family
+from copsense.design import Family, joint_groups
 from copsense.errors import InvalidInputError
-from copsense.identification.fitting import Progress
+from copsense.identification.families import identifiable_named
+from copsense.identification.fitting import Progress, fit_family
 from copsense.identification.identifying import Identification, identify
 from copsense.identification.measurements import Measurements
+from copsense.identification.parameter_fit import Estimate
 from copsense.logs.aligned_log import AlignedLog, align_log
 from copsense.logs.comparing import SKIPPED
 from copsense.logs.encoder_bias import biased_records, encoder_error, interval_note, some_rows
@@ -65,6 +67,40 @@ def identify_log(
         findings=aligned.findings,
         notes=(*aligned.notes, interval_note(encoders)),
     )
+
+
+def hip_ankle_ratio(
+    log: Log,
+    robot: str | Path | Robot | Stance,
+    *,
+    contacts: Sequence[str | Contact] | None = None,
+    skip: float = SKIPPED,
+    encoders: float = 0.0,
+) -> Estimate:
+    """The torque weight of the hips in shares of the ankles' that explains a log, in motion.
+
+    What `identify_log` finds of the family ``joints``, without its cross-validation.
+
+    Args:
+        log: as of `identify_log`, like all others.
+        robot: the robot.
+        contacts: its contacts.
+        skip: the log's beginning that is left out [s].
+        encoders: standard deviation of each encoder's constant error [rad, or m].
+
+    Raises:
+        InvalidInputError: the names of the robot's joints do not tell hips from ankles.
+        CopsenseError: as `identify_log`.
+    """
+    measured = log_measurements(log, robot, contacts=contacts, skip=skip, encoders=encoders)
+    groups = joint_groups(measured.stances[0])
+    if not {"hip", "ankle"} <= set(groups):
+        raise InvalidInputError(
+            "the names of the joints do not tell hips from ankles: no ratio of their weights. Ask "
+            "copsense identify --family joints for those of its groups."
+        )
+    family = identifiable_named(measured.stances[0], "joints")
+    return fit_family(family, measured).estimates["hip_weight"]
 
 
 def log_measurements(

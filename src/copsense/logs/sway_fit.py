@@ -129,6 +129,8 @@ def find_sway(times: Float[np.ndarray, " N"], travel: Float[np.ndarray, " N"]) -
     power = np.abs(np.fft.rfft(even, 4 * count))
     grid = np.arange(len(power)) / (4 * length * count / (count - 1))
     inside = (grid >= 0.5 / length) & (grid <= _HIGHEST)
+    if not inside.any():  # shorter than half a period of anything that sways
+        return Sway("regression", math.nan, half, 0.0)
     at, step = grid[inside][int(np.argmax(power[inside]))], 0.25 / length
     found = minimize_scalar(
         unexplained, bounds=(max(0.3 / length, at - step), at + step), method="bounded"
