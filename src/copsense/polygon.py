@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from copsense.arrays import finite_array
 from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError
+from copsense.qp import linear_minimum
 
 _ROUNDING = 1e-12  # m: how far beyond a line a vertex may be and still be on it
 _ON_LINE = 1e-9  # m: a point nearer to a segment is on it
@@ -314,16 +315,13 @@ class Polygon:
         Args:
             x: only points of this x [m]; negative room where the polygon has none.
         """
-        # Slow to import, seldom needed, and not of `statics.qp`: polygons are below the statics.
-        from scipy.optimize import linprog
-
-        found = linprog(
-            [0.0, 0.0, -1.0],
-            A_ub=np.column_stack([self.normals, np.ones(len(self.normals))]),
-            b_ub=self.offsets,
-            bounds=[(x, x), (None, None), (None, None)],
-        )
-        return -float(found.fun)
+        normals, offsets = self.normals, self.offsets
+        if x is not None:
+            normals, offsets = normals[:, 1:], offsets - normals[:, 0] * x
+        cost = -np.eye(normals.shape[1] + 1)[-1]
+        found = linear_minimum(cost, np.column_stack([normals, np.ones(len(normals))]), offsets)
+        assert found is not None  # far enough outside there always is a point
+        return float(found[-1])
 
 
 def padded(polygons: Sequence[Polygon | None]) -> Float[np.ndarray, "n k 2"]:

@@ -9,9 +9,9 @@ import scipy.optimize
 from support.random_cases import random_case, random_stance
 
 import copsense
+from copsense import qp as program
 from copsense.errors import InfeasibleError, UnsolvedError
 from copsense.limits import Limits
-from copsense.statics import qp as program
 
 
 def spoiled(how):

@@ -10,8 +10,8 @@ from copsense.criterion import Criterion
 from copsense.errors import UnsolvedError
 from copsense.limits import Limits, limit_rows
 from copsense.load_problem import LoadProblem
+from copsense.qp import quick_optimum
 from copsense.stance import Stance
-from copsense.statics.qp import quick_optimum
 
 _FEASIBLE = 1e-9  # share of the weight by which a row may be violated
 # How much dearer, per squared newton, a missed momentum rate is than the criterion's own cost.

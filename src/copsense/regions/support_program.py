@@ -9,7 +9,7 @@ from jaxtyping import Float
 from copsense.errors import InfeasibleError, InvalidInputError
 from copsense.limits import LimitRows
 from copsense.load_problem import LoadProblem
-from copsense.statics.qp import least_relaxation, linear_minimum
+from copsense.qp import least_relaxation, linear_minimum
 
 _NOTHING = 1e-9  # of the weight: conflicts of limits that rounding explains
 _PROOF = 1e-10  # of the weight, or of a unit of z: what a linear program's solution may leave

@@ -24,10 +24,10 @@ import numpy as np
 import scipy.linalg
 from jaxtyping import Float, Int
 
+from copsense import qp
 from copsense.content import ShortRepr
 from copsense.errors import CopsenseError, UnsolvedError
 from copsense.row_space import RowSpace
-from copsense.statics import qp
 from copsense.statics.symmetric import SymmetricSystem
 
 _FEASIBLE = 1e-9  # violation of a row, in shares of the unit, that rounding may leave
@@ -264,13 +264,10 @@ class Program(ShortRepr):
         return None if flag < 1 else np.flatnonzero(np.abs(l) > 0)
 
     def _active_by_nnls(self) -> np.ndarray | None:
-        """The same by non-negative least squares (Lawson and Hanson, least distance programming).
+        """The same by non-negative least squares.
 
         With H = R' R and y = (R z + R^-T h) / unit the program is: the shortest y with A' y <= b'.
-        Its multipliers are the non-negative combination u of rows nearest to (0, .., 0, 1).
         """
-        from scipy.optimize import nnls
-
         H, h, A, b = self._reduced
         if not len(b) or not len(h):
             return None  # nothing that the first solver did not see
@@ -278,31 +275,20 @@ class Program(ShortRepr):
             R = np.linalg.cholesky(H).T
             offset = scipy.linalg.solve_triangular(R, h, trans="T")
             rows = scipy.linalg.solve_triangular(R, A.T, trans="T").T
-            length = _lengths(rows)
-            bound = (b + rows @ offset) / length
-            bound /= max(float(np.abs(bound).max(initial=0.0)), 1e-300)
-            C = np.vstack([-(rows / length[:, None]).T, -bound])
-            u, _ = nnls(C, np.eye(len(C))[-1], maxiter=30 * C.shape[1])
-        except (np.linalg.LinAlgError, RuntimeError, ValueError):
+        except (np.linalg.LinAlgError, ValueError):
             return None
-        return np.flatnonzero(u > 0)
+        length = _lengths(rows)
+        u = qp.least_distance_multipliers(rows / length[:, None], (b + rows @ offset) / length)
+        return None if u is None else np.flatnonzero(u > 0)
 
     def _conflict(self) -> tuple[float, np.ndarray]:
         """The least violation of all rows that leaves a point, and the rows that demand it."""
-        from scipy.optimize import linprog
-
-        N, k = self.null, self.null.shape[1]
         # Bounded, or what rounding leaves of a zero becomes a way out at 1e9 times the unit.
-        far = _FAR * self.unit
-        found = linprog(
-            np.eye(k + 1)[k],
-            A_ub=np.column_stack([self.A @ N, -np.ones(len(self.b))]),
-            b_ub=self.b - self.A @ self.start,
-            bounds=[(-far, far)] * k + [(0, None)],
-        )
-        if found.status != 0:
+        left, far = self.b - self.A @ self.start, _FAR * self.unit
+        found = qp.least_relaxation(self.A @ self.null, left, np.ones(len(left)), far)
+        if found is None:
             return 0.0, np.zeros(0, dtype=int)
-        return float(found.x[k]), np.flatnonzero(-found.ineqlin.marginals > 1e-9)
+        return found[0], np.flatnonzero(found[1] > 1e-9)
 
 
 def _lengths(rows: np.ndarray) -> np.ndarray:

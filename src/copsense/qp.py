@@ -1,8 +1,10 @@
-"""Qp: the solver of quadratic and linear programs, its answers validated.
+"""Qp: the solvers of quadratic and linear programs, their answers validated.
 
-No other module calls daqp. `dual_active_set` is the call, for `program.Program`, which solves
-exactly; `quick_optimum` is for a control loop, where microseconds count and the solver's own
-precision is enough; `linear_minimum` and `least_relaxation` are linear programs.
+No other module calls daqp, or SciPy's linear programs and non-negative least squares.
+`dual_active_set` is the call, for `statics.program.Program`, which solves exactly, with
+`least_distance_multipliers` in reserve; `quick_optimum` is for a control loop, where microseconds
+count and the solver's own precision is enough; `linear_minimum` and `least_relaxation` are linear
+programs.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ _STEPS = 20  # proximal steps; one to three are usual
 _NOTHING = 1e-9  # of the unit: a slope so small, of a cost whose curvature is 1, is none
 _EXACT = 1e-9  # violation of the cost's own conditions under which no further step is taken
 _PROOF = 1e-10  # what a linear program's solution may leave
-_LINEAR_TOLERANCES = (1e-10, 1e-9, 1e-8)  # of the slower solver, in the order tried
+_LINEAR_TOLERANCES = (1e-10, 1e-9, 1e-8, 1e-7)  # of the slower solver, in the order tried
 
 
 def dual_active_set(
@@ -40,6 +42,24 @@ def dual_active_set(
         **settings,
     )
     return np.asarray(x), int(flag), np.asarray(info["lam"])
+
+
+def least_distance_multipliers(
+    A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"]
+) -> Float[np.ndarray, " r"] | None:
+    """What presses at the shortest y with A y <= b (Lawson and Hanson); None where it failed.
+
+    The multipliers, but for their scale, are the non-negative combination u of rows nearest to
+    (0, .., 0, 1).
+    """
+    from scipy.optimize import nnls
+
+    C = np.vstack([-A.T, -b / max(float(np.abs(b).max(initial=0.0)), 1e-300)])
+    try:
+        u, _ = nnls(C, np.eye(len(C))[-1], maxiter=30 * C.shape[1])
+    except (RuntimeError, ValueError):
+        return None
+    return np.asarray(u)
 
 
 def quick_optimum(
@@ -114,17 +134,23 @@ def linear_minimum(
     y = _linear_by_dual_active_set(cost, A, b)
     if y is not None:
         return y
-    for tolerance in _LINEAR_TOLERANCES:  # some faces are too slight for the finest
-        found = _linear_program(cost, A, b, tolerance)
-        if found.status == 0:
-            return np.asarray(found.x)
-    return None
+    found = _linear_program(cost, A, b)
+    return None if found is None else np.asarray(found.x)
 
 
 def least_relaxation(
-    A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"], soft: Float[np.ndarray, " r"]
+    A: Float[np.ndarray, "r z"],
+    b: Float[np.ndarray, " r"],
+    soft: Float[np.ndarray, " r"],
+    far: float | None = None,
 ) -> tuple[float, Float[np.ndarray, " r"]] | None:
     """minimise s >= 0 subject to A y - s soft <= b: how far rows must be relaxed to leave a point.
+
+    Args:
+        A: rows.
+        b: their bounds.
+        soft: how much each row is relaxed per unit of s, 0 for one that is not.
+        far: the largest entry that y may have; None for any.
 
     Returns:
         s, and each row's multiplier (r,), zero where it does not press; None if unsolved.
@@ -132,8 +158,9 @@ def least_relaxation(
     v = A.shape[1]
     rows = np.vstack([np.hstack([A, -soft[:, None]]), -np.eye(v + 1)[-1:]])
     cost = np.append(np.zeros(v), 1.0)
-    found = _linear_program(cost, rows, np.append(b, 0.0), _LINEAR_TOLERANCES[0])
-    if found.status != 0:
+    bounds = (None, None) if far is None else [(-far, far)] * v + [(None, None)]
+    found = _linear_program(cost, rows, np.append(b, 0.0), bounds)
+    if found is None:
         return None
     return float(found.fun), -np.asarray(found.ineqlin.marginals)[:-1]
 
@@ -142,16 +169,20 @@ def _linear_program(
     cost: Float[np.ndarray, " z"],
     A: Float[np.ndarray, "r z"],
     b: Float[np.ndarray, " r"],
-    tolerance: float,
+    bounds: object = (None, None),
 ) -> Any:
-    """SciPy's answer to: minimise cost y subject to A y <= b."""
+    """SciPy's answer to: minimise cost y subject to A y <= b; None where it has none."""
     from scipy.optimize import linprog
 
-    options = {
-        "primal_feasibility_tolerance": tolerance,
-        "dual_feasibility_tolerance": tolerance,
-    }
-    return linprog(cost, A, b, bounds=(None, None), method="highs-ds", options=options)
+    for tolerance in _LINEAR_TOLERANCES:  # some faces are too slight for the finest
+        options = {
+            "primal_feasibility_tolerance": tolerance,
+            "dual_feasibility_tolerance": tolerance,
+        }
+        found = linprog(cost, A, b, bounds=bounds, method="highs-ds", options=options)
+        if found.status == 0:
+            return found
+    return None
 
 
 def _linear_by_dual_active_set(cost: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
@@ -160,6 +191,7 @@ def _linear_by_dual_active_set(cost: np.ndarray, A: np.ndarray, b: np.ndarray) -
     Then cost y >= -l b for every feasible y, which has to be met.
     """
     v = A.shape[1]
+    A, b = np.array(A), np.array(b)  # the solver takes no read-only arrays
     # A linear program as proximal steps, until the steps no longer move.
     steps = {"eps_prox": 1e-4, "eta_prox": 1e-12, "iter_limit": 1000}
     y, flag, l = dual_active_set(
