@@ -6,6 +6,8 @@ import pytest
 
 import copsense
 from copsense.errors import InvalidInputError
+from copsense.limits import torque_limits
+from copsense.simulation.disturbance import Motors
 
 
 def biped(order):
@@ -70,3 +72,27 @@ def test_the_limb_of_a_contact_is_the_chain_from_the_base(icub):
     assert icub.limb(icub.contacts[1]) == icub.limb("r_sole")
     with pytest.raises(copsense.errors.UnknownNameError, match="Did you mean l_sole"):
         icub.limb("l_soul")
+
+
+def test_the_models_effort_limit_means_one_thing(icub):
+    """To the limits of statics, to the weights of a criterion and to the motors of a simulation."""
+    efforts = icub.robot.effort_limits
+    assert not np.all(np.isfinite(efforts))
+    assert not np.array_equal(efforts, icub.robot.model.upperEffortLimit[6:])
+    assert np.array_equal(torque_limits(icub, "model"), efforts)
+    assert np.array_equal(Motors(limit="model").limits(icub.robot), efforts)
+    with pytest.raises(InvalidInputError, match="placeholder"):
+        copsense.solve_equilibrium(icub, copsense.weighted_torque("1/limit^2"))
+
+
+def test_zeros_for_limits_reject_no_posture(icub):
+    """Zeros, as some files write no limits, are none: a posture is not held against them."""
+    model = icub.robot.model.copy()
+    model.lowerPositionLimit = np.zeros(model.nq)
+    model.upperPositionLimit = np.zeros(model.nq)
+    robot = copsense.Robot.from_model(model)
+    q = np.array(icub.q)
+    q[7:] = 0.0
+    q[9] = 7.0
+    robot.check_positions(q)
+    assert np.all(copsense.Stance(robot, q, [copsense.Contact("l_sole")]).joint_limit_excess == 0)

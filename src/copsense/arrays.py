@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import cached_property
 from typing import Any, TypeVar, cast, overload
 
 import numpy as np
 
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UnknownNameError
 
 Array = TypeVar("Array", bound=np.ndarray)
 
@@ -102,6 +102,17 @@ def check_name(value: object, what: str) -> None:
     """
     if not isinstance(value, str) or not value:
         raise InvalidInputError(f"{what} is {reprlib.repr(value)}. Give a text.")
+
+
+def check_keys(data: Mapping[str, Any], keys: Collection[str], what: str) -> None:
+    """Reject a key that a table does not have.
+
+    Raises:
+        UnknownNameError: it has another one.
+    """
+    for key in data:
+        if key not in keys:
+            raise UnknownNameError(f"key of {what}", str(key), keys)
 
 
 def checked_positions(value: Mapping[str, float] | None, what: str) -> dict[str, float]:

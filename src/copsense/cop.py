@@ -14,6 +14,7 @@ from copsense.rigid_body import link_momentum_rate, momentum_rate
 from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
+LEAST_LOAD = 1e-3  # share of the weight: measured under less, a contact has no centre of pressure
 _LEVEL = 1e-6  # m, or 1 - cosine: how far contacts may be from one horizontal plane
 
 
@@ -43,6 +44,12 @@ def wrench_cops(
     if loaded is not None:
         normal = np.where(loaded[..., None], normal, np.nan)
     return np.asarray(wrenches[..., 4:2:-1] * (-1.0, 1.0) / normal)
+
+
+def load_shares(wrenches: Float[np.ndarray, "*n nc 6"]) -> Float[np.ndarray, "*n nc"]:
+    """Each contact's share of the normal forces of all."""
+    normal = wrenches[..., 2]
+    return np.asarray(normal / normal.sum(axis=-1, keepdims=True))
 
 
 def edge_margin(polygon: ArrayLike, point: ArrayLike) -> EdgeMargin:
@@ -84,7 +91,7 @@ def total_center_of_pressure(
     equilibrium: StaticEquilibrium, plane: Plane | None = None
 ) -> Float[np.ndarray, " 3"]:
     """Centre of pressure of the whole robot on a plane, in the world [m]."""
-    return center_of_pressure(*_resultant(equilibrium.stance, equilibrium.world_wrenches), plane)
+    return center_of_pressure(*resultant(equilibrium.stance, equilibrium.world_wrenches), plane)
 
 
 def support_polygon(stance: Stance) -> Polygon | None:
@@ -171,16 +178,18 @@ def foot_rotation_indicator(
         shape, meaning = (len(names), 6), "in contact axes, force first"
         others = finite_array(other_wrenches, "other_wrenches", shape, meaning).copy()
         others[k] = 0.0
-        taken_f, taken_m = _resultant(stance, stance.in_world_axes(others))
+        taken_f, taken_m = resultant(stance, stance.in_world_axes(others))
         force, moment = force - taken_f, moment - taken_m
     return center_of_pressure(force, moment, plane)
 
 
-def _resultant(stance: Stance, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force and moment about the world's origin of wrenches given in world axes."""
+def resultant(
+    stance: Stance, world: Float[np.ndarray, "*n nc 6"]
+) -> tuple[Float[np.ndarray, "*n 3"], Float[np.ndarray, "*n 3"]]:
+    """Force [N] and moment [Nm] about the world's origin of wrenches given in world axes."""
     origins = np.array([place.translation for place in stance.placements])
-    moment = world[:, 3:].sum(axis=0) + np.cross(origins, world[:, :3]).sum(axis=0)
-    return world[:, :3].sum(axis=0), moment
+    moments = world[..., 3:] + np.cross(origins, world[..., :3])
+    return world[..., :3].sum(axis=-2), moments.sum(axis=-2)
 
 
 def _required(

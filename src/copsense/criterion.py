@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import check_name, check_type, finite_array, finite_number
+from copsense.arrays import check_keys, check_name, check_type, finite_array, finite_number
 from copsense.contact import Contact
 from copsense.content import ByContent
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -148,7 +148,7 @@ class Criterion(ByContent):
                 "a criterion in a file needs a name and a list of terms, as Criterion.to_dict() "
                 f"writes them; this is {data!r}."
             )
-        _known(data, ("name", "terms", "tie_break"), "a criterion")
+        check_keys(data, ("name", "terms", "tie_break"), "a criterion")
         tie = data.get("tie_break")
         terms = tuple(_term(each) for each in data["terms"])
         name = str(data.get("name", "criterion"))
@@ -161,10 +161,10 @@ def _term(data: object) -> Term:
         raise InvalidInputError(f"{data!r} is not a term of a criterion. Give a table of its keys.")
     kind, rest = data.get("kind"), {k: v for k, v in data.items() if k != "kind"}
     if kind == "torque":
-        _known(rest, ("weights", "scale"), "a torque term")
+        check_keys(rest, ("weights", "scale"), "a torque term")
         return TorqueTerm(**rest)
     if kind == "wrench":
-        _known(rest, ("weights", "reference", "scale"), "a wrench term")
+        check_keys(rest, ("weights", "reference", "scale"), "a wrench term")
         if "weights" not in rest:
             raise InvalidInputError("a wrench term has no weights. Give six numbers.")
         if rest.get("reference") is not None:
@@ -172,19 +172,13 @@ def _term(data: object) -> Term:
             rest["reference"] = finite_array(rest["reference"], what, (None, 6))
         return WrenchTerm(**rest)
     if kind == "preload":
-        _known(rest, ("displacement", "scale"), "a preload term")
+        check_keys(rest, ("displacement", "scale"), "a preload term")
         if "displacement" not in rest:
             raise InvalidInputError("a preload term has no displacement. Give six numbers each.")
         return PreloadTerm(**rest)
     raise UnknownNameError(
         "kind of term of a criterion", str(kind), ("torque", "wrench", "preload")
     )
-
-
-def _known(data: Mapping[str, Any], keys: tuple[str, ...], what: str) -> None:
-    for key in data:
-        if key not in keys:
-            raise UnknownNameError(f"key of {what}", str(key), keys)
 
 
 def minimum_wrench(characteristic_length: float, *, name: str = "minimum-wrench") -> Criterion:

@@ -1,19 +1,20 @@
-"""Files: outputs that are written whole or not at all, and tables of configurations read in."""
+"""Files: outputs, written whole or not at all; TOML and tables of configurations read in."""
 
 from __future__ import annotations
 
 import os
 import tempfile
+import tomllib
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import check_type, finite_array
-from copsense.errors import InvalidInputError, OutputError
+from copsense.errors import CopsenseError, InvalidInputError, OutputError
 
 
 def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool) -> Path:
@@ -86,6 +87,31 @@ def checked_path(path: object, what: str) -> Path:
 def file_at(path: str | Path) -> bool:
     """Whether there is a file at a path; false for a name that no file can have."""
     return _holds(Path(path).is_file)
+
+
+def read_toml(
+    path: str | Path, what: str, remedy: str, error: type[CopsenseError] = InvalidInputError
+) -> dict[str, Any]:
+    """The tables of a TOML file, with or without a byte-order mark.
+
+    Args:
+        path: of the file.
+        what: how a message calls it, such as ``"plan"``.
+        remedy: a sentence that says what to give where there is no such file.
+        error: what is raised.
+
+    Raises:
+        CopsenseError: of the kind asked for: no such file, or it is not TOML.
+    """
+    path = checked_path(path, f"a {what}")
+    if not file_at(path):
+        raise error(f"no {what} at {str(path)[:300]!r}. {remedy}")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as reason:
+        raise error(f"the {what} {path} cannot be read: {reason.strerror}. {remedy}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+        raise error(f"the {what} {path} is not valid TOML: {reason}. Correct the file.") from None
 
 
 def load_configurations(path: str | Path) -> Float[np.ndarray, "N nq"]:

@@ -10,7 +10,7 @@ def listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def first_few(names: Iterable[str], most: int) -> str:
+def first_few(names: Iterable[str], most: int = 12) -> str:
     """The first of some names, and how many more there are: a, b and 3 more."""
     known = list(names)
     more = f" and {len(known) - most} more" if len(known) > most else ""

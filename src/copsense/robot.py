@@ -497,6 +497,28 @@ class Robot:
         return float(np.arctan2(here[1], here[0]) if model_joint.nq == 2 else here[0])
 
     @cached_property
+    def position_entries(self) -> tuple[tuple[int, bool], ...]:
+        """Of each one-degree-of-freedom joint its entry of q, and whether it is (cos, sin) there.
+
+        So is a joint that turns without end.
+        """
+        joints = [joint for joint in list(self.model.joints)[2:] if joint.nv == 1]
+        return tuple((int(joint.idx_q), joint.nq == 2) for joint in joints)
+
+    def joint_positions(self, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " s"]:
+        """Position of every one-degree-of-freedom joint at a configuration (s,) [rad or m]."""
+        entries = self.position_entries
+        return np.array([np.arctan2(q[i + 1], q[i]) if circle else q[i] for i, circle in entries])
+
+    def limb(self, joint: int) -> tuple[int, ...]:
+        """Joints of the model from the base to one of them and with it, the base's own left out.
+
+        Args:
+            joint: its index in the model.
+        """
+        return tuple(int(i) for i in self.model.supports[joint] if i > 1)
+
+    @cached_property
     def _frame_ids(self) -> dict[str, int]:
         """Index of each frame by its name, the kinds of `_NAMED` taking the name in their order."""
         ids: dict[str, int] = {}
@@ -597,13 +619,11 @@ class Robot:
         """
         if np.abs(q[3 if self.base_nv == 6 else 2 :]).max(initial=0.0) <= 2 * np.pi:
             return  # no joint turns further: nothing to look at in detail
-        for name, unit in zip(self.dof_names, self.dof_units, strict=True):
-            joint = self.model.joints[self.model.getJointId(name)]
-            if name in self.joint_names and joint.nq == 1:
-                lower = float(self.model.lowerPositionLimit[joint.idx_q])
-                upper = float(self.model.upperPositionLimit[joint.idx_q])
-                if not lower <= q[joint.idx_q] <= upper:
-                    check_joint_position(float(q[joint.idx_q]), name, unit, lower, upper)
+        lower, upper = self.position_limits
+        for at, entry in zip(*self.single_joints, strict=True):
+            low, high, position = float(lower[at]), float(upper[at]), float(q[entry])
+            if not low <= position <= high:
+                check_joint_position(position, self.dof_names[at], self.dof_units[at], low, high)
 
     def _configuration(self, q: object) -> Float[np.ndarray, " nq"]:
         meaning = (

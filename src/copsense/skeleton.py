@@ -6,7 +6,13 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from copsense.robot import Robot
 from copsense.stance import Stance
+
+
+def links(robot: Robot) -> list[tuple[int, int]]:
+    """Each joint of the model behind the base's, after the one that carries it."""
+    return [(int(robot.model.parents[i]), i) for i in range(2, robot.model.njoints)]
 
 
 def skeleton(stance: Stance) -> Float[np.ndarray, "s 2 3"]:
@@ -15,7 +21,7 @@ def skeleton(stance: Stance) -> Float[np.ndarray, "s 2 3"]:
     data = model.createData()
     pin.forwardKinematics(model, data, np.array(stance.q))
     origins = np.array([data.oMi[i].translation for i in range(model.njoints)])
-    lines = [(origins[model.parents[i]], origins[i]) for i in range(2, model.njoints)]
+    lines = [(origins[a], origins[b]) for a, b in links(stance.robot)]
     for contact, place in zip(stance.contacts, stance.placements, strict=True):
         lines.append((origins[stance.robot.frame(contact.frame).parentJoint], place.translation))
     return np.array(lines).reshape(-1, 2, 3)

@@ -329,8 +329,7 @@ class Stance:
             if contact not in self.contact_names:
                 raise UnknownNameError("contact", contact, self.contact_names)
             contact = self.contacts[self.contact_names.index(contact)]
-        joint = self.robot.frame(contact.frame).parentJoint
-        return tuple(int(i) for i in self.robot.model.supports[joint] if i > 1)
+        return self.robot.limb(contact.on(self.robot).joint)
 
     @cached_property
     def _motions(self) -> RowSpace:

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +27,6 @@ _KINDS: dict[str, LoopKind] = {
     "ball": "ball",
     "fixed": "weld",
 }
-_LISTED = 12  # names that a note gives at most
 
 
 @dataclass(eq=False)
@@ -108,7 +107,7 @@ class _Reader:
         locked = {c.joint: held[c.joint] for c in mimics if c.joint in held}
         self._lock(locked)
         if locked:
-            at = _listed(f"{joint} at {value:g}" for joint, value in locked.items())
+            at = first_few(f"{joint} at {value:g}" for joint, value in locked.items())
             self.notes.append(f"Joints that mimic a fixed joint do not move: {at} (rad or m).")
         for c in lost:
             self.notes.append(
@@ -117,7 +116,7 @@ class _Reader:
             )
         if several:
             self.notes.append(
-                f"The <mimic> of joints with several positions ({_listed(several)}) is not used."
+                f"The <mimic> of joints with several positions ({first_few(several)}) is not used."
             )
         return tuple(kept)
 
@@ -157,7 +156,7 @@ class _Reader:
             else:
                 found.append(self._loop(element, name, _KINDS[given], ends))
         if unused:
-            self.notes.append(f"{_listed(dict.fromkeys(unused))} in the file is not used.")
+            self.notes.append(f"{first_few(dict.fromkeys(unused))} in the file is not used.")
         return tuple(found)
 
     def _loop(self, element: ET.Element, name: str, kind: LoopKind, ends: list[ET.Element]) -> Loop:
@@ -222,15 +221,15 @@ class _Reader:
             (idle if limb[0] in driven else untold).extend(left)
         if untold:
             self.notes.append(
-                f"Joints {_listed(untold)} have no <transmission>, nor has the first of their "
+                f"Joints {first_few(untold)} have no <transmission>, nor has the first of their "
                 "limb, while others have; they are taken to have motors. passive=[...] (--passive "
                 "JOINT) takes them away."
             )
         if not idle:
             return None
         self.notes.append(
-            f"Joints {_listed(idle)} have no <transmission>, while others of their limbs do: they "
-            "are taken to have no motor. drives=Drives(...) (--motor JOINT) gives them one."
+            f"Joints {first_few(idle)} have no <transmission>, while others of their limbs do: "
+            "they are taken to have no motor. drives=Drives(...) (--motor JOINT) gives them one."
         )
         motors = [j for j in self.moving if j not in idle and j not in followers]
         return tuple(label for joint in motors for label in self._labels(joint))
@@ -258,7 +257,7 @@ class _Reader:
                 zero.append(name)
         if zero:
             self.notes.append(
-                f'Joints {_listed(zero)} have effort="0", which is taken as no limit known. If '
+                f'Joints {first_few(zero)} have effort="0", which is taken as no limit known. If '
                 "they have no motor, say so with passive=[...] (--passive JOINT)."
             )
 
@@ -275,7 +274,3 @@ def _is_joint(element: ET.Element) -> bool:
 
 def _numbers(element: ET.Element, attribute: str, default: str) -> tuple[float, ...]:
     return tuple(read_numbers(element.get(attribute, default)) or read_numbers(default) or ())
-
-
-def _listed(names: Iterable[str]) -> str:
-    return first_few(names, _LISTED)

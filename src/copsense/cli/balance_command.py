@@ -42,8 +42,6 @@ from copsense.errors import InvalidInputError
 if TYPE_CHECKING:
     from copsense.simulation import Recording
 
-_TOO_FAST = 0.05  # share of the CoM's motion by which the centre of pressure may go farther
-
 
 @click.command(
     epilog="\b\nExamples:\n"
@@ -224,6 +222,7 @@ def _interrupts() -> Iterator[Callable[[], bool]]:
 
 def _print(recording: Recording) -> None:
     from copsense.simulation.sway_comparison import sway_slopes
+    from copsense.sway_levers import STATIC_SHARE
 
     attributes, end, tip = recording.attrs, recording.end, recording.tip
     through = tip and recording.completed
@@ -250,12 +249,12 @@ def _print(recording: Recording) -> None:
         click.echo(f"  likely cause: {attributes['likely_cause']}")
     if attributes.get("static_statement"):
         click.echo(f"  static prediction: {attributes['static_statement']}")
-    if attributes.get("quasi_static_share", 0.0) > _TOO_FAST:
+    if attributes.get("quasi_static_share", 0.0) > STATIC_SHARE:
         excess, share = attributes["quasi_static_excess"], attributes["quasi_static_share"]
         click.echo(
             f"  too fast for statics: in motion the centre of pressure goes up to "
             f"{excess * 1e3:.1f} mm ({share * 100:.0f} %) farther than the CoM. Statics are right "
-            f"within {_TOO_FAST * 100:.0f} % up to {_frequencies(attributes)}"
+            f"within {STATIC_SHARE * 100:.0f} % up to {_frequencies(attributes)}"
         )
     for contact, found in sway_slopes(recording).items():
         for key, what, unit in (("load", "load", "N/m"), ("cop_y", "CoP y", "mm/mm")):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from copsense.errors import (
     MissingExtraError,
     UnknownNameError,
 )
+from copsense.files import read_toml
 from copsense.simulation import Scenario
 
 
@@ -52,16 +52,7 @@ def read_plan(path: str | Path) -> tuple[Case, ...]:
         UnknownNameError: a table, field or name that is not known.
     """
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidInputError(
-            f"the plan {path} cannot be read: {error.strerror}. Give the path of a TOML file."
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidInputError(
-            f"the plan {path} is not valid TOML: {error}. Correct this line."
-        ) from None
+    content = read_toml(path, "plan", "Give the path of a TOML file.")
     for name in content:
         if name not in (*_READERS, "block"):
             raise UnknownNameError(f"table in {path.name}", name, (*_READERS, "block"))

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from copsense.arrays import finite_array
 from copsense.contact import COMPONENT_NAMES
 from copsense.content import ShortRepr, freeze
+from copsense.cop import load_shares
 from copsense.errors import InvalidInputError
 from copsense.stance import Stance
 
@@ -156,13 +157,11 @@ def _channels(
                 columns.append(given[:, k, i])
         known = np.isfinite(columns).all(axis=1)
         if not known.all():  # normal forces alone
-            normal = given[:, :, 2]
-            if not np.isfinite(normal).all() or len(first.contacts) < 2:
+            if not np.isfinite(given[:, :, 2]).all() or len(first.contacts) < 2:
                 names, columns = [], []
             else:
-                shares = normal / normal.sum(axis=1, keepdims=True)
                 names = [f"load share of {c.name}" for c in first.contacts[:-1]]
-                columns = list(shares.T[:-1])
+                columns = list(load_shares(given).T[:-1])
     if torques is not None:
         motors = first.robot.torque_names
         given = _rows(torques, "the torques", (len(stances), len(motors)))

@@ -212,7 +212,7 @@ def _locked(whole: Robot, model: Robot, contacts: Sequence[Contact]) -> list[str
     legs = {
         str(whole.model.names[j])
         for contact in contacts
-        for j in whole.model.supports[contact.on(whole).joint]
+        for j in whole.limb(contact.on(whole).joint)
     }
     missing = [name for name in locked if name in legs]
     if missing:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from copsense.arrays import check_type, finite_number, whole_number
 from copsense.contact import Contact
+from copsense.cop import resultant, wrench_cops
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.logs.aligned_log import POSTURES, AlignedLog, align_log
 from copsense.logs.encoder_bias import biased_records, encoder_error, interval_note, some_rows
@@ -122,12 +123,8 @@ def compare_log(
 
 def _total_cop(stance: Stance, wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M 2"]:
     """Total centre of pressure on the ground, z = 0; NaN where moments were not measured."""
-    force, moment = np.zeros((len(wrenches), 3)), np.zeros((len(wrenches), 3))
-    for k, place in enumerate(stance.placements):
-        f = wrenches[:, k, :3] @ place.rotation.T
-        force += f
-        moment += wrenches[:, k, 3:] @ place.rotation.T + np.cross(place.translation, f)
-    return np.column_stack([-moment[:, 1], moment[:, 0]]) / force[:, 2:]
+    world = np.array([stance.in_world_axes(row) for row in wrenches])
+    return wrench_cops(np.concatenate(resultant(stance, world), axis=-1))
 
 
 def _sway(

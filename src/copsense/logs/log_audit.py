@@ -92,9 +92,7 @@ def check_encoders(log: Log, robot: Robot, contacts: Sequence[Contact]) -> list[
     """Joints of the legs whose encoders say the same all along."""
     found = []
     legs = {
-        model_joint
-        for contact in contacts
-        for model_joint in robot.model.supports[contact.on(robot).joint]
+        model_joint for contact in contacts for model_joint in robot.limb(contact.on(robot).joint)
     }
     for name, column in zip(log.joint_names, log.positions.T, strict=True):
         known = column[np.isfinite(column)]

@@ -11,11 +11,12 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.content import FrozenMapping, freeze
+from copsense.cop import load_shares
 from copsense.errors import UnknownNameError
 from copsense.json_data import json_data
 from copsense.logs.finding import Finding
 from copsense.logs.log import Log
-from copsense.logs.log_statics import LogStatics, load_shares, loaded_cops
+from copsense.logs.log_statics import LogStatics, loaded_cops
 from copsense.logs.sway_fit import SlopeEstimate, Sway
 from copsense.posture_run import PostureRun
 

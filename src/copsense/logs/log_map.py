@@ -14,7 +14,6 @@ A reference is the key of a signal, or ``key[3]`` or ``key[label]`` for one of i
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,12 +21,12 @@ from typing import Any, Literal, get_args
 
 import tomli_w
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_keys, finite_array, finite_number
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.files import check_output, checked_path, file_at, write_beside
+from copsense.files import check_output, read_toml, write_beside
 from copsense.logs.log import SENSOR_KINDS, SensorKind
-from copsense.robots.stance_tables import known, list_of, table_of
+from copsense.robots.stance_tables import list_of, table_of
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 Rotation = Literal["xyzw", "wxyz", "rpy", "rpy_deg", "ypr", "matrix"]
@@ -219,11 +218,11 @@ class LogMap:
             UnknownNameError: an unknown key.
             InvalidInputError: something is missing, or of the wrong kind.
         """
-        known(data, ("time", "joints", "wrenches", "base"), "a log's mapping")
+        check_keys(data, ("time", "joints", "wrenches", "base"), "a log's mapping")
         time = table_of(data.get("time", {}), "time")
-        known(time, ("key", "unit", "rate_Hz"), "[time]")
+        check_keys(time, ("key", "unit", "rate_Hz"), "[time]")
         joints = table_of(data.get("joints", {}), "joints")
-        known(joints, tuple(JointsMap.__dataclass_fields__), "[joints]")
+        check_keys(joints, tuple(JointsMap.__dataclass_fields__), "[joints]")
         if "positions" not in joints:
             raise InvalidInputError(
                 f"{origin} does not say where the joint positions are. Give positions under "
@@ -231,7 +230,7 @@ class LogMap:
             )
         base = table_of(data["base"], "base") if "base" in data else None
         if base is not None:
-            known(base, tuple(BaseMap.__dataclass_fields__), "[base]")
+            check_keys(base, tuple(BaseMap.__dataclass_fields__), "[base]")
             if "position" not in base or "rotation" not in base:
                 raise InvalidInputError(
                     f"{origin}: [base] needs position and rotation. Give both, or leave it out."
@@ -271,22 +270,16 @@ class LogMap:
         Raises:
             InvalidInputError: there is no such file, or it is not a mapping.
         """
-        path = checked_path(path, "a mapping")
-        if not file_at(path):
-            raise InvalidInputError(
-                f"no mapping at {str(path)[:300]!r}. Give a .toml file, or leave it out: many "
-                "layouts are recognised, and --save-map writes what was."
-            )
-        try:
-            data = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise InvalidInputError(f"{path} is not TOML: {error}.") from None
-        return cls.from_dict(data, str(path))
+        remedy = (
+            "Give a .toml file, or leave it out: many layouts are recognised, and --save-map "
+            "writes what was."
+        )
+        return cls.from_dict(read_toml(path, "mapping", remedy), str(path))
 
 
 def _wrench(data: Mapping[str, Any]) -> WrenchMap:
     own = ("name", "contact", "frame", "kind", "sign", "offset", "file", "starts")
-    known(data, (*own, *COMPONENTS, "wrench"), "[[wrenches]]")
+    check_keys(data, (*own, *COMPONENTS, "wrench"), "[[wrenches]]")
     if not data.get("contact"):
         raise InvalidInputError(
             "a sensor of [[wrenches]] does not say which contact it serves. Give contact: the "

@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.contact import Contact
-from copsense.logs.log_statics import load_shares, loaded_cops
+from copsense.cop import load_shares
+from copsense.logs.log_statics import loaded_cops
 from copsense.logs.sway_fit import LEAST, SlopeEstimate, Sway, fit_sway
 from copsense.stance import Stance
 

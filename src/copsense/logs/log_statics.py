@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 
 from copsense.contact import Contact
 from copsense.content import ShortRepr, freeze
-from copsense.cop import wrench_cops
+from copsense.cop import LEAST_LOAD, load_shares, wrench_cops
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.load_problem import LoadProblem
@@ -18,8 +18,6 @@ from copsense.logs.log_motion import LogMotion
 from copsense.robot import Robot
 from copsense.stance import Stance
 from copsense.statics import share_load
-
-_LOADED = 1e-3  # share of the weight under which a contact has no centre of pressure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,16 +56,10 @@ class LogStatics(ShortRepr):
         return loaded_cops(self.wrenches)
 
 
-def load_shares(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M nc"]:
-    """Each contact's share of the normal forces."""
-    normal = wrenches[:, :, 2]
-    return np.asarray(normal / normal.sum(axis=1, keepdims=True))
-
-
 def loaded_cops(wrenches: Float[np.ndarray, "M nc 6"]) -> Float[np.ndarray, "M nc 2"]:
     """Centres of pressure [m]; NaN under next to no normal force."""
     normal = np.abs(wrenches[:, :, 2])
-    return wrench_cops(wrenches, normal > _LOADED * np.nansum(normal, axis=1, keepdims=True))
+    return wrench_cops(wrenches, normal > LEAST_LOAD * np.nansum(normal, axis=1, keepdims=True))
 
 
 def log_statics(

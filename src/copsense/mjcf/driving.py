@@ -7,9 +7,9 @@ from typing import Any
 import mujoco
 
 from copsense.drives import Drives, Spring
+from copsense.listing import first_few
 from copsense.mjcf.equalities import Equalities
 from copsense.mjcf.motors import Motors
-from copsense.mjcf.scene import listed
 from copsense.mjcf.tree_model import Tree
 
 _BALL = int(mujoco.mjtJoint.mjJNT_BALL)
@@ -53,4 +53,4 @@ def _springs(mj: Any, tree: Tree) -> tuple[dict[str, Spring], tuple[str, ...]]:
     if not bent:
         return found, ()
     why = "they are not linear in one position"
-    return found, (f"springs (stiffness) of joints {listed(bent)} are not used: {why}.",)
+    return found, (f"springs (stiffness) of joints {first_few(bent)} are not used: {why}.",)

@@ -15,8 +15,8 @@ import mujoco
 import numpy as np
 
 from copsense.drives import Transmission
+from copsense.listing import first_few
 from copsense.mjcf.effort import largest_force
-from copsense.mjcf.scene import listed
 from copsense.mjcf.tendons import tendon_bodies, tendon_joints
 from copsense.mjcf.tree_model import Tree, actuators_of
 
@@ -54,8 +54,8 @@ class Motors:
         partly = [j for j in on_joint if self._is_ball(j) and len(actuators_of(mj, j)) < 3]
         if partly:
             self.notes.append(
-                f"ball joints {listed(map(self.tree.name_of, partly))} have fewer actuators than "
-                "axes; they are taken to have a motor about each."
+                f"ball joints {first_few(map(self.tree.name_of, partly))} have fewer actuators "
+                "than axes; they are taken to have a motor about each."
             )
         alone = (on_joint | other) - tendons
         transmissions = list(self._transmissions(by_tendon, on_joint | other))
@@ -69,7 +69,7 @@ class Motors:
         idle = [j for j in idle if self.tree.name_of(j) not in self.followers]
         if idle:
             self.notes.append(
-                f"joints {listed(map(self.tree.name_of, idle))} have no actuator, while others "
+                f"joints {first_few(map(self.tree.name_of, idle))} have no actuator, while others "
                 "have; they have no motor."
             )
         motors = tuple(dof for j in joints if j in alone for dof in self._dofs(j))
@@ -142,12 +142,15 @@ class Motors:
                 apart.append(name)
         if spatial:
             self.notes.append(
-                f"actuators {listed(spatial)} do not act on a single joint or a fixed tendon; each "
-                f"joint that they move ({listed(self.tree.name_of(j) for j in sorted(joints))}) is "
-                "taken to have a motor of its own."
+                f"actuators {first_few(spatial)} do not act on a single joint or a fixed tendon; "
+                "each joint that they move "
+                f"({first_few(self.tree.name_of(j) for j in sorted(joints))}) is taken "
+                "to have a motor of its own."
             )
         if apart:
-            self.notes.append(f"actuators {listed(apart)} do not act on joints; they are not used.")
+            self.notes.append(
+                f"actuators {first_few(apart)} do not act on joints; they are not used."
+            )
         return joints
 
     def _moved(self, actuator: int) -> set[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -11,7 +11,6 @@ from copsense.errors import InvalidInputError, ModelLoadError, UnknownNameError
 from copsense.listing import first_few
 
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
-_LISTED = 12  # names that a note gives at most
 
 
 def find_robot(mj: Any, frames: Sequence[str], root: str | None) -> int:
@@ -59,13 +58,8 @@ def left_out(mj: Any, root: int) -> tuple[str, ...]:
     others = [_described(mj, tree) for tree in _trees(mj) if tree != root]
     if not others:
         return ()
-    held = listed(others)
+    held = first_few(others)
     return (f"beside the robot ({_label(mj, root)}) the file holds {held}; none of it is used.",)
-
-
-def listed(names: Iterable[str]) -> str:
-    """Names for a note, and how many more there are."""
-    return first_few(names, _LISTED)
 
 
 def body_label(mj: Any, body: int) -> str:
@@ -126,7 +120,7 @@ def _likely(mj: Any) -> int:
             "the MJCF holds no robot: its <worldbody> has no <body> that moves or has "
             "mass. Correct the file."
         )
-    choices = listed(_described(mj, t) for t in (limbed or sorted(free) or trees))
+    choices = first_few(_described(mj, t) for t in (limbed or sorted(free) or trees))
     raise InvalidInputError(
         f"the MJCF holds several things that could be the robot: {choices}. Name the contacts "
         "(contacts=[...], --contact FRAME), or say which with load_robot(..., root=BODY)."

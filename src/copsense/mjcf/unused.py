@@ -7,7 +7,8 @@ from typing import Any
 
 import mujoco
 
-from copsense.mjcf.scene import body_label, listed
+from copsense.listing import first_few
+from copsense.mjcf.scene import body_label
 from copsense.mjcf.tendons import tendon_bodies
 from copsense.mjcf.tree_model import Tree
 
@@ -26,7 +27,7 @@ def unused(mj: Any, tree: Tree) -> tuple[str, ...]:
 def _lifted(mj: Any, tree: Tree) -> Iterator[str]:
     lifted = [b for b in tree.bodies if mj.body_gravcomp[b]]
     if lifted:
-        names = listed(body_label(mj, b) for b in lifted)
+        names = first_few(body_label(mj, b) for b in lifted)
         yield f"gravcomp of {names} is not used: their whole weight counts."
 
 
@@ -38,11 +39,11 @@ def _tendons(mj: Any, tree: Tree) -> Iterator[str]:
         and tendon_bodies(mj, t) & tree.bodies.keys()
     ]
     if tendons:
-        names = listed(mj.tendon(t).name or f"number {t}" for t in tendons)
+        names = first_few(mj.tendon(t).name or f"number {t}" for t in tendons)
         yield f"springs and limits of tendons {names} are not used."
 
 
 def _ball_ranges(mj: Any, tree: Tree) -> Iterator[str]:
     balls = [j for j in tree.joints if mj.jnt_type[j] == _BALL and mj.jnt_limited[j]]
     if balls:
-        yield f"ranges of ball joints {listed(tree.name_of(j) for j in balls)} are not used."
+        yield f"ranges of ball joints {first_few(tree.name_of(j) for j in balls)} are not used."

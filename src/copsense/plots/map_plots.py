@@ -15,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
 from copsense.maps.marginals import Marginal
+from copsense.plots.marking import say
 from copsense.plots.reading import MM
 from copsense.plots.robot_plots import draw_bones
 from copsense.plots.style import (
@@ -109,7 +110,7 @@ def _draw_row(
     low, high = _range(shown)
     if np.isinf(values).any() and not np.isfinite(values).any():
         for ax in axes:
-            _say(ax, _UNLIMITED)
+            say(ax, _UNLIMITED)
     for ax, name, cells in zip(axes, here.criteria, shown, strict=False):
         mesh = _heat(ax, here, cells, cmap=colours, vmin=low, vmax=high)
         ax.set_title(f"{names[name]}\n{here.how} {words}", fontsize=9)
@@ -136,7 +137,7 @@ def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
     mesh.set_rasterized(True)
     known = cells[np.isfinite(cells)]
     if not len(known) and not ax.texts:
-        _say(ax, _NONE)
+        say(ax, _NONE)
     # The same levels across a row, so that a flat map shows no lines.
     levels = MaxNLocator(_LEVELS).tick_values(colour["vmin"], colour["vmax"])
     crossed = [
@@ -163,17 +164,12 @@ def _level(value: float) -> str:
     return f"{value + 0.0:.6g}"
 
 
-def _say(ax: Axes, words: str) -> None:
-    """Write in the middle of axes that have nothing to show."""
-    ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", color=MUTED)
-
-
 def _draw_postures(ax: Axes, name: str, skeletons: Sequence[np.ndarray]) -> None:
     """Skeletons in the frontal plane, seen by someone in front of the robot."""
     for lines, shade in zip(skeletons[: len(_SHADES)], _SHADES, strict=False):
         draw_bones(ax, lines, 1, shade)
     if not skeletons:
-        _say(ax, "none")
+        say(ax, "none")
     ax.axhline(0.0, color=MUTED, linewidth=COM_LINE["linewidth"])
     ax.set_aspect("equal", adjustable="datalim")
     ax.set_title(f"{name}\npostures of least travel", fontsize=9)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +17,7 @@ from copsense.plots.style import (
     EDGE_LINE,
     MUTED,
     SOLE,
+    STATIC_LINE,
     Color,
     Looks,
     Panels,
@@ -34,7 +34,6 @@ from copsense.simulation import Event, Recording
 
 _SIX = ("forces", "CoPs", "the CoPs from above", "the CoM", "torques", "CoPs over a joint")
 _CONTACTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 _RED = "#b3261e"
 _STILL = 0.1  # mm: smaller motions are drawn as standing still
 _MOST_NAMED = 6  # joints whose torque has a line of its own in the legend
@@ -178,13 +177,13 @@ def _draw_above(ax: Axes, recording: Recording, look: Looks) -> None:
 def _draw_com(ax: Axes, recording: Recording) -> None:
     time = recording["time"]
     target, com = (recording[n].sel(com_axis="y") * MM for n in ("com_target", "com"))
-    ax.plot(time, target, **_STATIC)
+    ax.plot(time, target, **STATIC_LINE)
     ax.plot(time, com, color="#1d2733")
     ax.set_ylabel("CoM y [mm]")
     span = np.concatenate([target.values, com.values])
     if np.ptp(span) < _STILL:  # rounding is not a motion
         ax.set_ylim(span.mean() - _STILL, span.mean() + _STILL)
-    wide = Line2D([], [], label="asked for", **{**_STATIC, "linewidth": 4.0})
+    wide = Line2D([], [], label="asked for", **{**STATIC_LINE, "linewidth": 4.0})
     put_legend(ax, [wide, Line2D([], [], color="#1d2733", label="measured")])
 
 
@@ -245,7 +244,7 @@ def _draw_against(ax: Axes, recording: Recording, look: Looks, joint: str | None
         within = (there >= x.min() - 0.5) & (there <= x.max() + 0.5)
         for k in range(len(look.colour)):
             cop = np.where(within, recording["static_cop"].values[:, k, 1] * MM, np.nan)
-            ax.plot(there, cop, **_STATIC)
+            ax.plot(there, cop, **STATIC_LINE)
     for k, (name, c) in enumerate(look.colour.items()):
         cop = stood["cop"].values[:, k, 1] * MM
         ax.plot(x, cop, color=c, linewidth=1.3, linestyle=styles[name])
@@ -263,7 +262,7 @@ def _draw_against(ax: Axes, recording: Recording, look: Looks, joint: str | None
         for n, c in look.colour.items()
     ]
     if "static_cop" in recording:
-        handles.append(Line2D([], [], label="static", **{**_STATIC, "linewidth": 4.0}))
+        handles.append(Line2D([], [], label="static", **{**STATIC_LINE, "linewidth": 4.0}))
     if edges:
         handles.append(Line2D([], [], label="sole's edges", **EDGE_LINE))
     put_legend(ax, handles)

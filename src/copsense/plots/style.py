@@ -32,6 +32,7 @@ INK, MUTED, SOLE, BAD = "#1d2733", "#5b6672", "#e8ecf0", "#fbeae6"
 COM_LINE: dict[str, Any] = {"color": INK, "linewidth": 1.1, "linestyle": (0, (6, 2, 1, 2))}
 OFF_SOLE: dict[str, Any] = {"linewidth": 1.3, "linestyle": (0, (1.0, 1.6))}
 LIMIT_LINE: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (1, 2))}
+STATIC_LINE: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 EDGE_LINE: dict[str, Any] = {"color": MUTED, "linewidth": 1.1, "linestyle": (0, (1.2, 1.6))}
 _KNOWN = {
     "minimum-wrench": "#D55E00",

@@ -105,7 +105,7 @@ def _knees_axis(
     """The horizontal axis about which most joints of every leg turn, or None."""
     axes = []
     for foot in feet:
-        turning = np.array([_turning_axis(robot, q, i)[:2] for i in _limb(robot, foot)])
+        turning = np.array([_turning_axis(robot, q, i)[:2] for i in robot.limb(foot.joint)])
         counts, directions = np.linalg.eigh(turning.reshape(-1, 2).T @ turning.reshape(-1, 2))
         if counts[1] - counts[0] < _PLAINLY:
             return None
@@ -177,7 +177,7 @@ def _leg(
     Where a hip has no such joint of its own, all that turn above the knee pitch the thigh together,
     if they can.
     """
-    names = [robot.model.names[i] for i in _limb(robot, foot)]
+    names = [robot.model.names[i] for i in robot.limb(foot.joint)]
     pitch = [name for name in names if abs(_axis(robot, q, name, heading)) > 0.8]
     below = 2 if foot.kind == "surface" else 1
     if len(pitch) < below:
@@ -232,11 +232,6 @@ def _turning_axis(robot: Robot, q: Float[np.ndarray, " nq"], joint: int) -> Floa
     jacobian = pin.computeJointJacobian(robot.model, data, q, joint)
     pin.forwardKinematics(robot.model, data, q)
     return np.asarray(data.oMi[joint].rotation @ jacobian[3:, robot.model.joints[joint].idx_v])
-
-
-def _limb(robot: Robot, foot: Foot) -> list[int]:
-    """The joints from the base to a foot."""
-    return [i for i in robot.model.supports[foot.joint] if i > 1]
 
 
 def _sign(robot: Robot, q: Float[np.ndarray, " nq"], joint: str, heading: float) -> float:

@@ -12,7 +12,6 @@ instead, and whole contacts, and is not solved again.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import tomli_w
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_keys, finite_array, finite_number
 from copsense.drives import Drives
 from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError
-from copsense.files import check_output, write_beside
+from copsense.files import check_output, read_toml, write_beside
 from copsense.loads import Load, SpringLoad
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS
@@ -33,7 +32,6 @@ from copsense.robots.stance_tables import (
     configuration_data,
     contact_data,
     drives_data,
-    known,
     list_of,
     load_data,
     read_configuration,
@@ -109,16 +107,9 @@ class StanceFile:
             UnknownNameError: a key that a stance file does not have.
         """
         where = Path(path)
-        try:
-            data = tomllib.loads(where.read_text(encoding="utf-8-sig"))
-        except OSError as error:
-            raise ModelLoadError(
-                f"the stance file {where} cannot be read: {error.strerror}. Give a .toml file that "
-                "copsense.robots.save_stance or --save-stance wrote."
-            ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ModelLoadError(f"{where} is not TOML: {error}. Correct the file.") from None
-        known(data, _KEYS, "a stance file")
+        remedy = "Give a .toml file that copsense.robots.save_stance or --save-stance wrote."
+        data = read_toml(where, "stance file", remedy, ModelLoadError)
+        check_keys(data, _KEYS, "a stance file")
         if not isinstance(data.get("robot"), str):
             raise InvalidInputError(
                 f'the stance file {where} names no robot. Write, say, robot = "icub", or the path '

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_keys, finite_array, finite_number
 from copsense.contact import Contact, Plane
 from copsense.drives import Coupling, Drives, Loop, Spring, Transmission
-from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.errors import InvalidInputError
 from copsense.loads import Load, SpringLoad
 from copsense.robot import Robot
 from copsense.stance import Stance
@@ -39,7 +39,7 @@ def configuration_data(stance: Stance) -> dict[str, Any]:
 
 def read_configuration(robot: Robot, data: Mapping[str, Any]) -> np.ndarray:
     """The configuration (nq,) that ``[configuration]`` says."""
-    known(data, ("base", "joints_rad", "joints_m", "joints_q"), "a configuration")
+    check_keys(data, ("base", "joints_rad", "joints_m", "joints_q"), "a configuration")
     named = {**table_of(data.get("joints_rad", {}), "joints_rad")}
     named |= table_of(data.get("joints_m", {}), "joints_m")
     missing = set(robot.joint_names) - set(named) - set(data.get("joints_q", {}))
@@ -114,7 +114,7 @@ _CONTACT = (
 
 def read_contact(data: Mapping[str, Any]) -> Contact:
     """The contact that a table of ``[[contacts]]`` says."""
-    known(data, _CONTACT, "a contact")
+    check_keys(data, _CONTACT, "a contact")
     what = f"contact {data.get('frame')!r}"
     plane = None
     if "plane_normal" in data or "plane_point_m" in data:
@@ -173,7 +173,7 @@ def read_loads(data: Mapping[str, Any]) -> list[Load | SpringLoad]:
         allowed = ["frame", "name", "fixed_to", *(k for k, v in _LOAD_KEYS.items() if v in own)]
         for each in list_of(data.get(key, []), key):
             table = table_of(each, key)
-            known(table, [k for k in allowed if k != "fixed_to" or "fixed_to" in own], key)
+            check_keys(table, [k for k in allowed if k != "fixed_to" or "fixed_to" in own], key)
             values: dict[str, Any] = {}
             for k, v in table.items():
                 name = _LOAD_KEYS.get(k, k)
@@ -201,7 +201,7 @@ def load_data(load: Load | SpringLoad) -> dict[str, Any]:
 def read_payload(data: object) -> dict[str, Any]:
     """What a table of ``[[payloads]]`` says, as `Robot.with_payload` takes it."""
     table = table_of(data, "payloads")
-    known(table, ("frame", "mass_kg", "com_m"), "a payload")
+    check_keys(table, ("frame", "mass_kg", "com_m"), "a payload")
     return {
         "frame": _text(table, "frame", "a payload"),
         "mass": finite_number(table.get("mass_kg"), "mass_kg of a payload"),
@@ -212,11 +212,11 @@ def read_payload(data: object) -> dict[str, Any]:
 def read_drives(data: Mapping[str, Any]) -> Drives:
     """The drives that ``[drives]`` says."""
     keys = ("motors", "held_Nm", "springs", "couplings", "loops", "transmissions")
-    known(data, keys, "drives")
+    check_keys(data, keys, "drives")
     springs = {}
     for each in list_of(data.get("springs", []), "springs"):
         table = table_of(each, "springs")
-        known(table, ("joint", "stiffness", "rest"), "a spring")
+        check_keys(table, ("joint", "stiffness", "rest"), "a spring")
         springs[_text(table, "joint", "a spring")] = Spring(
             finite_number(table.get("stiffness"), "stiffness of a spring"),
             finite_number(table.get("rest", 0.0), "rest of a spring"),
@@ -271,7 +271,7 @@ def _made(kind: Any, data: object) -> Any:
     what = f"a {kind.__name__.lower()}"
     table = table_of(data, what)
     names = [f.name for f in fields(kind)]
-    known(table, names, what)
+    check_keys(table, names, what)
     missing = [f.name for f in fields(kind)[:2] if f.name not in table]
     if missing:
         raise InvalidInputError(f"{what} in the drives has no {missing[0]}. Give it.")
@@ -279,13 +279,6 @@ def _made(kind: Any, data: object) -> Any:
     if "matrix" in values:
         values["matrix"] = finite_array(values["matrix"], f"the matrix of {what}", (None, None))
     return kind(**values)
-
-
-def known(data: Mapping[str, Any], keys: Iterable[str], what: str) -> None:
-    """Reject a key that a table does not have."""
-    for key in data:
-        if key not in keys:
-            raise UnknownNameError(f"key of {what}", str(key), keys)
 
 
 def table_of(value: object, what: str) -> Mapping[str, Any]:

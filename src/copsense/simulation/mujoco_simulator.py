@@ -23,7 +23,6 @@ from copsense.errors import (
     UnknownNameError,
 )
 from copsense.extras import require
-from copsense.robot import Robot
 from copsense.simulation.contact_wrenches import ContactWrenches
 from copsense.simulation.mujoco_drives import DriveForces
 from copsense.simulation.mujoco_model import build_model
@@ -94,10 +93,10 @@ class MujocoSimulator:
         self._site_positions = data.site_xpos
         self._site_axes = data.site_xmat.reshape(-1, 3, 3)
         self._warnings = data.warning.number
-        self._circles = _circles(stance.robot)
-        self._is_plain = np.array([not circle for _, circle in self._circles], dtype=bool)
-        self._plain = np.array([i for i, circle in self._circles if not circle], dtype=int)
-        self._round = np.array([i for i, circle in self._circles if circle], dtype=int)
+        entries = stance.robot.position_entries
+        self._is_plain = np.array([not circle for _, circle in entries], dtype=bool)
+        self._plain = np.array([i for i, circle in entries if not circle], dtype=int)
+        self._round = np.array([i for i, circle in entries if circle], dtype=int)
         self._contact_of_pair = self._wrenches.contact_of_pairs()
         self._friction = self._model.pair_friction.copy()
         driven = bool(stance.robot.drives or stance.loads)
@@ -199,9 +198,7 @@ class MujocoSimulator:
         x, y, z, w = q[3:7]
         self._data.qpos[:7] = [*q[:3], w, x, y, z]
         # A continuous joint is (cos, sin) in Pinocchio and an angle in MuJoCo.
-        self._data.qpos[self._positions] = [
-            np.arctan2(q[i + 1], q[i]) if round_ else q[i] for i, round_ in self._circles
-        ]
+        self._data.qpos[self._positions] = self._stance.robot.joint_positions(q)
         self._data.qvel[self._columns] = v
         self._data.qvel[:3] = pin.Quaternion(w, x, y, z).matrix() @ v[:3]
 
@@ -305,8 +302,3 @@ def load_mujoco() -> Any:
             "or glfw."
         ) from None
     return mujoco
-
-
-def _circles(robot: Robot) -> list[tuple[int, bool]]:
-    """Each joint's index in a configuration, and whether it is stored as (cos, sin)."""
-    return [(joint.idx_q, joint.nq == 2) for joint in list(robot.model.joints)[2:]]

@@ -240,10 +240,7 @@ def predict(
             loads[i] = point.equilibrium.wrenches[:, 2]
             cops[i], torques[i] = cops_or_nan(point.equilibrium), point.torques
             margins[i] = gaps.margin(point)
-    robot = start.stance.robot
-    joints = np.array(
-        [[robot.joint_position(s.q, joint) for joint in robot.joint_names] for s in path.stances]
-    )
+    joints = np.array([start.stance.robot.joint_positions(s.q) for s in path.stances])
     return StaticPrediction(
         values,
         cops,

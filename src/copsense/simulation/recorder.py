@@ -12,14 +12,12 @@ from copsense._version import __version__
 from copsense.contact import COMPONENT_NAMES
 from copsense.controllers.controller import Command
 from copsense.controllers.target import Target
-from copsense.cop import wrench_cops
+from copsense.cop import LEAST_LOAD, wrench_cops
 from copsense.ground import CONVENTIONS, ground_variables
 from copsense.simulation.events import Event
 from copsense.simulation.recording import Recording
 from copsense.simulation.simulator import Snapshot
 from copsense.stance import Stance
-
-_LOADED = 1e-3  # share of the weight under which a contact has no centre of pressure
 
 _VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
     "com": (("com_axis",), "m", "centre of mass, world axes"),
@@ -63,7 +61,6 @@ class Recorder:
         self._model = stance.robot.model
         self._data = self._model.createData()
         self._rows: dict[str, list[Any]] = {name: [] for name in ("time", *_VARIABLES)}
-        self._joints = [(j.idx_q, j.nq == 2) for j in list(self._model.joints)[2:] if j.nv == 1]
 
     def __len__(self) -> int:
         """Rows so far."""
@@ -91,10 +88,7 @@ class Recorder:
             "torque": np.array(torques),
             "torque_command": command.torques,
             "configuration": at.q,
-            "joint_position": [
-                np.arctan2(at.q[i + 1], at.q[i]) if circle else at.q[i]
-                for i, circle in self._joints
-            ],
+            "joint_position": self.stance.robot.joint_positions(at.q),
             "joint_velocity": at.v[6:],
             "tilt": tilts,
         }
@@ -181,7 +175,7 @@ class Recorder:
 def _cops(stance: Stance, wrenches: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Centres of pressure (N, nc, 2), NaN where unloaded, and their margins (N, nc)."""
     wrenches = wrenches.reshape(-1, len(stance.contacts), 6)
-    loaded = wrenches[:, :, 2] > _LOADED * stance.robot.weight
+    loaded = wrenches[:, :, 2] > LEAST_LOAD * stance.robot.weight
     cops = wrench_cops(wrenches, loaded)
     margins = np.full(cops.shape[:2], np.nan)
     for k, contact in enumerate(stance.contacts):

@@ -37,7 +37,7 @@ def compare_sway(recording: Recording) -> dict[str, dict[str, dict[str, tuple[fl
     return {
         name: {
             key: {
-                where: _range(values if where == "measured" else _along(on, there, values))
+                where: _range(values if where == "measured" else along_path(recording, on, values))
                 for where, values in each.items()
             }
             for key, each in outputs.items()
@@ -70,12 +70,12 @@ def sway_slopes(recording: Recording) -> dict[str, dict[str, dict[str, float]]]:
     waves = [wave(k * phase) for k in _HARMONICS for wave in (np.sin, np.cos)]
     fit = np.linalg.pinv(np.column_stack([np.ones_like(phase), *waves]))[1:3]
     com = fit @ stood["com"].sel(com_axis="y").values[kept]
-    turn, there = np.linspace(0.0, 2 * np.pi, 721)[:-1], recording["static_travel"].values
+    turn = np.linspace(0.0, 2 * np.pi, 721)[:-1]
 
     def slope(where: str, values: np.ndarray) -> float:
         if where == "measured":
             return float(fit @ values[kept] @ com / (com @ com))
-        passed = _along(amplitude * np.sin(turn), there, values)
+        passed = along_path(recording, amplitude * np.sin(turn), values)
         return float(2 * np.mean(passed * np.sin(turn)) / amplitude)
 
     return {
@@ -85,6 +85,22 @@ def sway_slopes(recording: Recording) -> dict[str, dict[str, dict[str, float]]]:
         }
         for name, outputs in _outputs(recording, stood).items()
     }
+
+
+def along_path(
+    recording: Recording, travel: Float[np.ndarray, " k"], values: Float[np.ndarray, " N"]
+) -> Float[np.ndarray, " k"]:
+    """What was predicted over the path, at other travels of the CoM; NaN beyond what is known.
+
+    Args:
+        recording: with a prediction beside it.
+        travel: of the CoM from the start [m].
+        values: at the path's postures, such as the load of a contact.
+    """
+    known, there = ~np.isnan(values), recording["static_travel"].values
+    if not known.any():
+        return np.full_like(travel, np.nan)
+    return np.interp(travel, there[known], values[known], left=np.nan, right=np.nan)
 
 
 def _outputs(
@@ -106,16 +122,6 @@ def _outputs(
             },
         }
     return found
-
-
-def _along(
-    on: Float[np.ndarray, " k"], there: Float[np.ndarray, " N"], values: Float[np.ndarray, " N"]
-) -> Float[np.ndarray, " k"]:
-    """Values of the path at other places; NaN beyond those that are known."""
-    known = ~np.isnan(values)
-    if not known.any():
-        return np.full_like(on, np.nan)
-    return np.interp(on, there[known], values[known], left=np.nan, right=np.nan)
 
 
 def _range(values: Float[np.ndarray, " k"]) -> tuple[float, float]:

@@ -20,6 +20,7 @@ from copsense.extras import require
 from copsense.files import check_output, write_beside
 from copsense.simulation.mujoco_simulator import load_mujoco
 from copsense.simulation.recording import Recording
+from copsense.skeleton import links
 from copsense.stance import Stance
 
 _RATE = 25  # frames a second
@@ -158,17 +159,13 @@ def _screen(stance: Stance) -> Iterator[Callable[[Recording, int], np.ndarray]]:
     camera.lookat[:] = [float(stance.com[0]), float(stance.com[1]), 0.75 * height]
     camera.distance, camera.azimuth, camera.elevation = 2.9 * height, 200.0, -18.0
     radius = 0.045 * height
-    links = [
-        (int(model.parents[i]), i) for i in range(2, model.njoints) if int(model.parents[i]) >= 1
-    ]
-
     with _renderer(scene_model) as renderer:
 
         def draw(recording: Recording, row: int) -> np.ndarray:
             pin.forwardKinematics(model, data, recording["configuration"].values[row])
             renderer.update_scene(scene_data, camera)
             scene = renderer.scene
-            for a, b in links:
+            for a, b in links(stance.robot):
                 start, end = data.oMi[a].translation, data.oMi[b].translation
                 if np.linalg.norm(end - start) > radius / 4:
                     _capsule(mujoco, scene, start, end, radius, _LINK)

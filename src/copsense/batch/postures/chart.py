@@ -7,7 +7,6 @@ a leg of six joints under a flat foot is a 6 x 6 system of its own. See `Posture
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from functools import partial
 
@@ -16,6 +15,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_number, whole_number
+from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
@@ -222,18 +222,8 @@ class PostureChart:
         if self._code is None:
             given = (*arguments, workspace(1), 0, 0)
             self._code = bound(solve_postures, given, "the search for postures")
-        solve, blocks = partial(self._code, *arguments), -(-len(x) // _BLOCK)
-
-        def run(share: int) -> None:
-            W = workspace(self._size)
-            for block in range(share, blocks, threads):
-                solve(W, block * _BLOCK, min((block + 1) * _BLOCK, len(x)))
-
-        if threads == 1:
-            run(0)
-        else:
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(run, range(threads)))
+        solve = partial(self._code, *arguments)
+        fill_blocks(lambda: partial(solve, workspace(self._size)), len(x), _BLOCK, threads)
 
     def _why_not(self, status: int, which: int, excess: float, residual: float) -> str:
         """Why a row has no posture."""

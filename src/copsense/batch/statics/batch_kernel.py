@@ -9,7 +9,6 @@ the reference answers all.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import TypeGuard
@@ -19,6 +18,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, whole_number
+from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.statics.batch_result import (
     GAINS,
@@ -197,19 +197,7 @@ class BatchKernel:
 
     def _fill(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
         """Have the kernel fill the results, block by block."""
-        blocks = -(-len(q) // _CHUNK)
-
-        fills = [self._filling(q, result, doubtful, _CHUNK) for _ in range(threads)]
-
-        def run(share: int) -> None:
-            for block in range(share, blocks, threads):
-                fills[share](block * _CHUNK, min((block + 1) * _CHUNK, len(q)))
-
-        if threads == 1:
-            run(0)
-        else:
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(run, range(threads)))
+        fill_blocks(lambda: self._filling(q, result, doubtful, _CHUNK), len(q), _CHUNK, threads)
 
     def _filling(
         self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, block: int

@@ -19,7 +19,7 @@ from copsense.paper.report.sway_plots import (
     plot_sway_load,
 )
 from copsense.paper.report.words import limit_words
-from copsense.plots.style import Figure
+from copsense.plots.style import whole_figure
 from copsense.reports import ReportFigure
 
 _SECTION = "closed-loop"
@@ -42,7 +42,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "The measured vertical forces stay within "
             f"{found['loop-half-weight'].number:.4f} m g of half the weight until a foot tips.",
             "Normal force of both feet against time: two lines at one half.",
-            lambda: _figure(plot_sway_load(sway.left)),
+            lambda: whole_figure(plot_sway_load(sway.left)),
         ),
         ReportFigure(
             "loop_6b",
@@ -50,7 +50,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "Fig. 6b in closed loop, minimum torque.",
             f"They follow the CoM over the period, from {load.min():.3f} to {load.max():.3f} m g.",
             "Normal force of both feet against time: two opposite waves about one half.",
-            lambda: _figure(plot_sway_load(sway.torque)),
+            lambda: whole_figure(plot_sway_load(sway.torque)),
         ),
         ReportFigure(
             "loop_7a",
@@ -60,7 +60,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             f"with {left * 1e3:.1f} mm to its sole's edge: contacts of this softness let a sole "
             "with round edges roll early.",
             "CoP y of both feet against time, parallel, until the right foot tips.",
-            lambda: _figure(plot_sway_cop(sway.left)),
+            lambda: whole_figure(plot_sway_cop(sway.left)),
         ),
         ReportFigure(
             "loop_7b",
@@ -68,7 +68,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "Fig. 7b in closed loop, minimum wrench, to the right.",
             f"The mirror image; the left foot tips at {_mm(tips[1])}.",
             "CoP y of both feet against time, parallel, until the left foot tips.",
-            lambda: _figure(plot_sway_cop(sway.right)),
+            lambda: whole_figure(plot_sway_cop(sway.right)),
         ),
         ReportFigure(
             "loop_8",
@@ -77,7 +77,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             f"The loaded foot's CoP moves {own:.2f} times as far as the other's. Under the lines, "
             "in grey, the static analysis at the CoM of each instant.",
             "CoP y of both feet against time over a full period: the loaded foot's is flatter.",
-            lambda: _figure(plot_sway_cop(sway.torque)),
+            lambda: whole_figure(plot_sway_cop(sway.torque)),
         ),
         ReportFigure(
             "loop_9b",
@@ -86,7 +86,7 @@ def sway_figures(sway: Sway, claims: tuple[EvaluatedClaim, ...]) -> tuple[Report
             "Against the left hip roll joint until a foot tips; the "
             f"static prediction beneath is at most {off:.2f} mm away.",
             "Left CoP against hip roll, both criteria, on top of their static predictions.",
-            lambda: _figure(
+            lambda: whole_figure(
                 plot_sway_hip_roll(
                     {
                         "minimum-wrench": [sway.left, sway.right],
@@ -204,9 +204,3 @@ def _quantity(value: float, unit: str) -> str:
 
 def _mm(value: float, *, sign: bool = False) -> str:
     return "–" if not math.isfinite(value) else f"{value:{'+' if sign else ''}.1f} mm"
-
-
-def _figure(ax: object) -> Figure:
-    figure = getattr(ax, "figure", None)
-    assert isinstance(figure, Figure)
-    return figure

@@ -28,7 +28,7 @@ from copsense.plots import (
     plot_soles,
     plot_torques,
 )
-from copsense.plots.style import Figure
+from copsense.plots.style import Figure, whole_figure
 from copsense.reports import ReportFigure
 from copsense.sensitivity import cop_sensitivity
 from copsense.statics import ActiveSetChange
@@ -103,7 +103,7 @@ def _four_bar(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "Both CoPs, each from its own foot, move with the CoM: between the feet their slopes "
             f"are within {together:.1%} of its own.",
             "Left CoP, right CoP and CoM against the leg angle: three nearly equal straight lines.",
-            lambda: _figure(plot_figure_3(three_a, WRENCH)),
+            lambda: whole_figure(plot_figure_3(three_a, WRENCH)),
         ),
         ReportFigure(
             "figure_3b",
@@ -113,7 +113,7 @@ def _four_bar(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "(the paper's text says 14°; dashed verticals).",
             "Left and right CoP against the leg angle: each is flat on one side and diverges on "
             "the other, at about 22 degrees.",
-            lambda: _figure(plot_figure_3(three_b, TORQUE)),
+            lambda: whole_figure(plot_figure_3(three_b, TORQUE)),
         ),
         ReportFigure(
             "figure_4",
@@ -123,7 +123,7 @@ def _four_bar(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             f"{over:.2f} m g, not m g, where the CoM is over the foot.",
             "Load of the right foot against the leg angle: constant at one half for minimum "
             "wrench, rising from below zero to above one for minimum torque.",
-            lambda: _figure(plot_criteria_curves(four, "load of the right foot, $f_y/(m g)$")),
+            lambda: whole_figure(plot_criteria_curves(four, "load of the right foot, $f_y/(m g)$")),
         ),
         ReportFigure(
             "figure_5",
@@ -134,7 +134,7 @@ def _four_bar(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             f"{_CEILING:g} mm/deg).",
             "Norm of the sensitivity against the leg angle: flat for minimum wrench; for minimum "
             "torque falling from a pole on the left to near zero on the right.",
-            lambda: _figure(
+            lambda: whole_figure(
                 plot_criteria_curves(five, r"$|\eta|$ of the right foot", ceiling=_CEILING)
             ),
         ),
@@ -159,7 +159,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
         beside = plot_figure_9b(both, three_a, three_b)
         ax = plot_figure_9a(three_a, three_b, reach)
         ax.set_ylim(beside.get_ylim())
-        return _figure(ax)
+        return whole_figure(ax)
 
     return (
         ReportFigure(
@@ -169,7 +169,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "The vertical forces hardly leave half the weight: "
             f"{facts.over_foot(facts.series[WRENCH].load)[0]:.3f} m g on the foot under the CoM.",
             "Load share of both feet against CoM y: two lines at one half.",
-            lambda: _figure(plot_load(left)),
+            lambda: whole_figure(plot_load(left)),
         ),
         ReportFigure(
             "figure_6b",
@@ -178,7 +178,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             f"The forces follow the CoM: {loaded:.3f} m g on the foot under it, {other:.3f} m g on "
             "the other. A full period of the sine goes there and back along these lines.",
             "Load share of both feet against CoM y: two lines that cross at one half.",
-            lambda: _figure(plot_load(torque)),
+            lambda: whole_figure(plot_load(torque)),
         ),
         ReportFigure(
             "figure_7a",
@@ -189,7 +189,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             f"{leaves:.1f} mm, long before the CoM is over the left foot.",
             "CoP y of both feet against CoM y, moving in parallel; both leave the grey bands that "
             "are the soles.",
-            lambda: _figure(plot_cop(left)),
+            lambda: whole_figure(plot_cop(left)),
         ),
         ReportFigure(
             "figure_7b",
@@ -197,7 +197,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "Fig. 7b, iCub, minimum wrench, CoM towards the right foot.",
             "The mirror image: the two CoPs move in parallel whichever foot is nearer to the CoM.",
             "CoP y of both feet against CoM y to the right, moving in parallel.",
-            lambda: _figure(plot_cop(right)),
+            lambda: whole_figure(plot_cop(right)),
         ),
         ReportFigure(
             "figure_8",
@@ -208,7 +208,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "the centre and on the loaded foot, steeper where a foot gives its load away.",
             "CoP y of both feet against CoM y: each flattens where its foot is loaded and steepens "
             "where it is not.",
-            lambda: _figure(plot_cop(torque)),
+            lambda: whole_figure(plot_cop(torque)),
             shape="alone",
         ),
         ReportFigure(
@@ -229,7 +229,7 @@ def _icub(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "four-bar's curves dashed beneath, the edges of the sole dotted.",
             "Left CoP against hip roll: nearly the same lines as on the four-bar, steeper at the "
             "end under minimum torque.",
-            lambda: _figure(plot_figure_9b(both, three_a, three_b)),
+            lambda: whole_figure(plot_figure_9b(both, three_a, three_b)),
         ),
     )
 
@@ -272,7 +272,7 @@ def _beyond(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "Slope at the centre against L on a logarithmic axis: an S-shaped curve from 0 to 1 "
             "that crosses minimum torque's line at L = d/2; the iCub's points lie on the closed "
             "form.",
-            lambda: _figure(plot_unit_of_length(unit)),
+            lambda: whole_figure(plot_unit_of_length(unit)),
             shape="alone",
         ),
         ReportFigure(
@@ -322,7 +322,7 @@ def _limits(reproduction: Reproduction) -> tuple[ReportFigure, ...]:
             "table says.",
             "Nested polygons over the two soles from above: the widest for friction and soles, the "
             "smallest for the criteria's own.",
-            lambda: _figure(plot_regions(within.regions, paper_criteria(reproduction))),
+            lambda: whole_figure(plot_regions(within.regions, paper_criteria(reproduction))),
             shape="alone",
         ),
     )
@@ -354,9 +354,3 @@ def _binding_words(bindings: tuple[ActiveSetChange, ...]) -> str:
 def paper_criteria(reproduction: Reproduction) -> Sweep:
     """The lateral sweep under the paper's two criteria."""
     return reproduction.lateral.subset([WRENCH, TORQUE])
-
-
-def _figure(ax: object) -> Figure:
-    figure = getattr(ax, "figure", None)
-    assert isinstance(figure, Figure)
-    return figure

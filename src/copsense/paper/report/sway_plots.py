@@ -16,6 +16,7 @@ from copsense.plots.style import (
     EDGE_LINE,
     MUTED,
     SOLE,
+    STATIC_LINE,
     add_legend,
     axes_or_new,
     colours,
@@ -25,10 +26,10 @@ from copsense.plots.style import (
 )
 from copsense.polygon import Polygon
 from copsense.simulation import Recording
+from copsense.simulation.sway_comparison import along_path
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _TIP: dict[str, Any] = {"color": "#b3261e", "linewidth": 1.1, "linestyle": (0, (4, 2))}
-_STATIC: dict[str, Any] = {"color": "#c3c9cf", "linewidth": 5.0, "zorder": 1.5}
 
 
 @styled
@@ -55,7 +56,6 @@ def plot_sway_cop(recording: Recording, *, ax: Axes | None = None, legend: bool 
     names, origins = labels(recording, "contact"), contact_origins(recording)
     soles, time = world_soles(recording), recording["time"].values
     y = recording["com"].sel(com_axis="y").values
-    travel = recording["static_travel"].values
     for k in range(len(names)):
         sole, turn = soles[k], recording["contact_rotation"].values[k, 1, :2]
         if sole is not None:
@@ -66,7 +66,7 @@ def plot_sway_cop(recording: Recording, *, ax: Axes | None = None, legend: bool 
                     ax.axhline(edge, **EDGE_LINE)
         world = origins[k, 1] + recording["cop"].values[:, k] @ turn * MM
         static = origins[k, 1] + recording["static_cop"].values[:, k] @ turn * MM
-        ax.plot(time, np.interp(y - y[0], travel, static), **_STATIC)
+        ax.plot(time, along_path(recording, y - y[0], static), **STATIC_LINE)
         ax.plot(time, world, color=_FEET[k % len(_FEET)], linewidth=1.5, zorder=2.5)
     ax.plot(time, y * MM, **COM_LINE)
     edges = np.vstack([origins, *(s for s in soles if s is not None)])[:, 1]
@@ -101,7 +101,7 @@ def plot_sway_hip_roll(
             there = run["static_joint"].sel(joint=joint).values * DEG
             shown = (there >= angle.min() - 0.1) & (there <= angle.max() + 0.1)
             static = np.where(shown, run["static_cop"].values[:, left, 1] * MM, np.nan)
-            ax.plot(there, static, **_STATIC)
+            ax.plot(there, static, **STATIC_LINE)
             ax.plot(angle, standing["cop"].values[:, left, 1] * MM, color=colour[name])
             if "sole_polygon" in run:
                 sole = Polygon.hull(run["sole_polygon"].values[left] * MM)
@@ -109,7 +109,7 @@ def plot_sway_hip_roll(
                     ax.axhline(edge, **EDGE_LINE)
     ax.set_xlabel(f"{joint} [deg]")
     ax.set_ylabel("CoP of the left foot, to the left [mm]")
-    static_line = Line2D([], [], label="static", color=_STATIC["color"], linewidth=4.0)
+    static_line = Line2D([], [], label="static", color=STATIC_LINE["color"], linewidth=4.0)
     edge_line = Line2D([], [], label="edge of the sole", **EDGE_LINE)
     add_legend(ax, colour, extra=[static_line, edge_line])
     return ax
@@ -135,7 +135,7 @@ def _feet(names: Sequence[str]) -> list[Line2D]:
 
 
 def _handles(names: Sequence[str]) -> list[Line2D]:
-    static = Line2D([], [], label="static", color=_STATIC["color"], linewidth=4.0)
+    static = Line2D([], [], label="static", color=STATIC_LINE["color"], linewidth=4.0)
     return [*_feet(names), static, Line2D([], [], label="CoM", **COM_LINE)]
 
 
