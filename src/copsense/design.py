@@ -323,9 +323,9 @@ def _search(
         if progress:
             progress(1)
     scores = [found for _, found in looked]
-    tell, most = progress or (lambda count: None), _calls(len(axes))
+    report, most = progress or (lambda count: None), _calls(len(axes))
     if not looked:
-        tell(most * len(_SIMPLEX))
+        report(most * len(_SIMPLEX))
         return scores, None
     # Of equals, such as where the path ends before any limit, the one that strains least.
     where, best = min(looked, key=lambda pair: (round(cost(pair[1]), 9), pair[1].torque_norm))
@@ -334,7 +334,7 @@ def _search(
 
         def measure(logs: np.ndarray) -> float:
             if logs.tobytes() not in known:
-                tell(1)
+                report(1)
             return cost(at(logs))
 
         # Inwards from a bound: clipped to it, the simplex would be flat and never leave it.
@@ -352,7 +352,7 @@ def _search(
                 "maxfev": most,
             },
         )
-        tell(most - (len(known) - before))
+        report(most - (len(known) - before))
         found = at(refined.x)
         if found and cost(found) < cost(best) - _ROUNDING:
             where, best = refined.x, found

@@ -124,7 +124,7 @@ def repetition_notes(stance: Stance) -> tuple[str, ...]:
     """Whether contacts, loops and couplings all but repeat each other; empty where they do not.
 
     What repeats it exactly counts as held twice; what nearly does carries forces that rigid statics
-    tell, and that nothing real, or simulated, shares so.
+    demand, and that nothing real, or simulated, shares so.
     """
     sizes = np.linalg.svd(stance.constraints, compute_uv=False)
     least = float(sizes[sizes > RANK_TOLERANCE].min(initial=np.inf))

@@ -1,4 +1,4 @@
-"""What C++ parsers print: caught, so that it can be told or left out."""
+"""What C++ parsers print: caught, so that it can be shown or left out."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ class Polygon:
     def sides(self) -> tuple[Float[np.ndarray, "s 2"], Float[np.ndarray, " s"]]:
         """Normals and offsets of a segment's two sides, which leave no room across it; else none.
 
-        They are no edges: a point on the segment is as far from the nearest edge as from its ends.
+        They are not edges: a point on the segment is as far from the nearest edge as from its ends.
         """
         if len(self) != 2:
             return _owned(np.zeros((0, 2))), _owned(np.zeros(0))

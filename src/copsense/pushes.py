@@ -3,7 +3,7 @@
 A push F at a frame takes J_e' F off the balance. Under a criterion the forces are affine in F, and
 so are the rows of the limits, r_i . F <= s_i: its own pushes are their intersection, the largest
 along u is ``min s_i / (r_i . u)+`` and the least of all directions ``min s_i / |r_i|``, across the
-row that gives way. What any equilibrium within the limits can answer is the projection of a
+row that yields. What any equilibrium within the limits can answer is the projection of a
 polyhedron, found by linear programs as a region of the CoM is (theory2.md, section 8).
 
 The push is slow, the posture is held, and what is pushed stands still: how far a robot that steps,
@@ -53,7 +53,7 @@ class PushRegion(ShortRepr):
         name: of the criterion, or ``"any equilibrium"``.
         polygon: vertices (k, 2) of the set of pushes, world x and y [N]; none where the limits are
             broken without any push.
-        first: what gives way first across each edge (k,), such as ``"l_sole: CoP at the -x (back)
+        first: what yields first across each edge (k,), such as ``"l_sole: CoP at the -x (back)
             edge"``; empty strings where it is not known.
     """
 
@@ -86,7 +86,7 @@ class PushRegion(ShortRepr):
             raise InvalidInputError("the direction of a push is zero. Give world x and y.")
         return self._crossing(u / length)[0]
 
-    def gives_way(self, direction: ArrayLike) -> str:
+    def yields(self, direction: ArrayLike) -> str:
         """What limits the largest push along a direction; empty where it is not known."""
         u = finite_array(direction, "the direction of a push", (2,), "world x, y")
         edge = self._crossing(u / max(float(np.linalg.norm(u)), 1e-300))[1]
@@ -94,7 +94,7 @@ class PushRegion(ShortRepr):
 
     @cached_property
     def weakest(self) -> tuple[float, float, str]:
-        """The least push that cannot be answered [N], its world direction [rad], what gives way."""
+        """The least push that cannot be answered [N], its world direction [rad], what yields."""
         if not self.stands:
             return 0.0, 0.0, ""
         edge = int(np.argmin(self._outline.offsets))
@@ -112,10 +112,10 @@ class PushRegion(ShortRepr):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: the polygon, and the weakest direction."""
-        force, angle, gives_way = self.weakest
+        force, angle, yields = self.weakest
         return {
             "polygon": self.polygon.tolist(),
-            "weakest": {"force": force, "direction": angle, "gives_way": gives_way},
+            "weakest": {"force": force, "direction": angle, "yields": yields},
         }
 
 
@@ -179,9 +179,9 @@ class Pushes(ShortRepr):
         ]
         for region in self.regions:
             along = [region.largest(u) for u in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-            force, angle, gives_way = region.weakest
+            force, angle, yields = region.weakest
             told = f"{_degrees(angle):+5d} deg" if region.stands else "does not stand"
-            told += f": {gives_way}" if gives_way else ""
+            told += f": {yields}" if yields else ""
             numbers = " ".join(f"{value:7.1f}" for value in along)
             lines.append(f"{region.name:26} {numbers} {force:9.1f}  {told}")
         return "\n".join(lines)

@@ -346,7 +346,7 @@ class Robot:
 
     @cached_property
     def torque_names(self) -> tuple[str, ...]:
-        """One label per entry of the torques: the motor, named as its joint unless told else."""
+        """One label per entry of the torques: the motor, by default named as its joint."""
         return self.dof_names if self.actuation is None else self.actuation.motors
 
     @cached_property

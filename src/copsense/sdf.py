@@ -193,7 +193,7 @@ def _joint_faults(joint: ET.Element, links: set[str]) -> Iterator[str]:
     for end in ("parent", "child"):
         name = end_of(joint, end)
         if name not in links and not (name == WORLD and end == "parent"):
-            yield f"the {end} {name!r} of {where} is no link of the model"
+            yield f"the {end} {name!r} of {where} is not a link of the model"
     for tag in ("axis", "axis2")[: AXES.get(kind, 0)]:
         axis = joint.find(tag)
         if axis is None:

@@ -404,7 +404,7 @@ class Stance:
         """Orthonormal basis Z of the velocities that move no contact and open no loop: J Z = 0.
 
         Without the `false_motions`, which J alone would allow. What hangs follows as gravity and
-        springs tell it.
+        springs have it.
         """
         Z = self._motions.null
         count = self.false_motions.shape[1]

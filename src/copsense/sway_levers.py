@@ -55,7 +55,7 @@ class SwayLever:
 
 
 def lever_outputs(contacts: Sequence[str]) -> tuple[str, ...]:
-    """Names of the outputs that `sway_levers` tells, in its order."""
+    """Names of the outputs of `sway_levers`, in its order."""
     return (NET, *(f"{what} of {name}" for name in contacts for what in ("load", "CoP")))
 
 

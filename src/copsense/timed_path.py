@@ -164,7 +164,7 @@ class Sway:
         check_path(self.path, search=True)
         if not self.path.continuous:
             raise InvalidInputError(
-                "a list of configurations is no curve to sway along: how it bends is not known. "
+                "a list of configurations is not a curve to sway along: how it bends is not known. "
                 "Make the path with lateral_sweep or joint_sweep, or follow the list with a "
                 "TimedPath."
             )

@@ -111,7 +111,7 @@ class _Reader:
             self.notes.append(f"Joints that mimic a fixed joint do not move: {at} (rad or m).")
         for c in lost:
             self.notes.append(
-                f"Joint {c.joint!r} mimics {c.of!r}, which is no joint with one position: the "
+                f"Joint {c.joint!r} mimics {c.of!r}, which is not a joint with one position: the "
                 "<mimic> is not used."
             )
         if several:
@@ -192,7 +192,7 @@ class _Reader:
     def motors(self, couplings: tuple[Coupling, ...]) -> tuple[str, ...] | None:
         """Names of the motors, or None where every joint that leads has one.
 
-        A <transmission> tells which joints a controller drives. Vendors of arms and of grippers put
+        A <transmission> says which joints a controller drives. Vendors of arms and of grippers put
         theirs into files of robots whose other joints have none: limbs whose first joint is in no
         transmission are not described by them, and keep their motors.
         """

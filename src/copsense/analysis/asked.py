@@ -1,4 +1,4 @@
-"""What an analysis is asked for: the posture, and the criteria that can be told there."""
+"""What an analysis is asked for: the posture, and the criteria that have an answer there."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def placed_stance(
 def determined_criteria(
     stance: Stance, criteria: Mapping[str, Criterion | WrenchPolicy], limits: Limits | None
 ) -> tuple[dict[str, Criterion | WrenchPolicy], list[str]]:
-    """The criteria that can be told here, each with a tie-break where it needs one, and notes.
+    """The criteria that have an answer here, each with a tie-break where it needs one, and notes.
 
     Args:
         stance: the posture.
@@ -78,7 +78,7 @@ def determined_criteria(
         limits: within which they are asked for.
 
     Raises:
-        UndeterminedWrenchError: none of them can be told.
+        UndeterminedWrenchError: none of them has one.
     """
     found: dict[str, Criterion | WrenchPolicy] = {}
     notes, errors = [], []

@@ -260,8 +260,8 @@ def analyse(
         joints: joint -> position to put it at [rad, or m for a prismatic joint].
         at: coordinate -> value of the posture instead, by name as in
             `copsense.batch.PostureChart` [m, rad]: CoM, base, joints and where the feet stand.
-            What is not named keeps the stance's value, where `com_y` alone lets everything give
-            way.
+            What is not named keeps the stance's value, where `com_y` alone lets everything else
+            yield.
         check: compare the derivatives with finite differences.
         period: of a sideways sway of the CoM about this posture [s]: `Analysis.sway` then says of
             each output what it does to the slope, and up to which frequency statics are within 5 %.

@@ -20,7 +20,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
-# Without a configuration of logging this goes to standard error: nobody waits in silence.
+# Without a configuration of logging this goes to standard error: no one waits in silence.
 _LOG = logging.getLogger(__name__)
 
 # Numba would look at a function's own file alone, and call an older version of a function from

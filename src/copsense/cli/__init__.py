@@ -28,7 +28,7 @@ _COMMANDS = {
         ("sweep", "sweep", "Sweep the CoM or a joint and evaluate every posture."),
         ("plot", "plot", "Draw a sweep that `copsense sweep` wrote."),
         ("map", "map_command", "Map the sensitivity over a whole space of postures."),
-        ("push", "push", "Push a robot that stands: how hard, from where, and what gives way."),
+        ("push", "push", "Push a robot that stands: how hard, from where, and what yields first."),
         ("design", "design", "Design the weights of a criterion that goes farther."),
         ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
         ("log", "log", "Compare a robot's own log with what every criterion says."),

@@ -265,7 +265,7 @@ def _print(recording: Recording) -> None:
 
 
 def _frequencies(attributes: Mapping[str, Any]) -> str:
-    """Up to where statics hold: the net CoP, and what else gives way earlier."""
+    """Up to where statics hold: the net CoP, and what else fails earlier."""
     net = attributes["quasi_static_frequency"]
     known = json.loads(attributes.get("static_frequencies", "{}"))
     least = min((f for f in known.values() if f is not None), default=net)

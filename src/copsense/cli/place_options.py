@@ -37,7 +37,7 @@ _AT = click.option(
     help="A coordinate of the posture, instead of --com-x, --com-y, --com-z and --joint: com_x, "
     "com_y, com_z, base_x, base_y, base_z, roll, pitch, yaw, a joint, CONTACT:x, CONTACT:y or "
     "CONTACT:yaw (metres, degrees, or with the unit). What is not named keeps the stance's "
-    "value: the base does not give way. Repeatable.",
+    "value: the base does not yield. Repeatable.",
 )
 
 

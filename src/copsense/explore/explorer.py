@@ -153,7 +153,7 @@ class Explorer:
         self.close()
 
     def _changed(self) -> None:
-        # Callbacks run in many threads: whoever reads last, reads the newest.
+        # Callbacks run in many threads: the last to read reads the newest.
         with self._lock:
             try:
                 state, self._problem = self._panel.read(), ""

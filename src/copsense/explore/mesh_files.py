@@ -48,7 +48,7 @@ def _whole(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndar
     if not len(faces) or not np.isfinite(vertices).all():
         what = "numbers that are not finite" if len(faces) else "no triangle"
         raise ModelLoadError(
-            f"mesh {path} holds {what}. Fetch the file anew, or leave meshes out with --no-meshes."
+            f"mesh {path} holds {what}. Fetch the file again, or leave meshes out with --no-meshes."
         )
     return vertices, faces
 

@@ -81,7 +81,7 @@ class Model:
 
         Args:
             stance: the robot on its contacts, at rest.
-            words: the words that tell the command line so; the robot's name where none are given.
+            words: the words that say so on the command line; the robot's name where none are given.
             criteria: what shares the load where a state names none; default the paper's two.
             limits: what ``"own"`` means in a state.
 

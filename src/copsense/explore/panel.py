@@ -126,10 +126,10 @@ class Panel:
         self._folders: dict[str, Any] = {}
         with gui.add_folder("Posture", visible=moved):
             self._mode = gui.add_dropdown(
-                "what gives way",
+                "what yields",
                 (NEAREST, HELD),
                 initial_value=HELD if state.held else NEAREST,
-                hint="nearest posture: everything that is not asked for gives way; base held: what "
+                hint="nearest posture: everything that is not asked for yields; base held: what "
                 "is not asked for keeps the stance's value",
             )
             self._mode.on_update(self._mode_changed)

@@ -30,7 +30,7 @@ def small_html(text: str) -> str:
 
 
 def status_html(view: View, status: str) -> str:
-    """What gives way first, or why there is no posture."""
+    """What yields first, or why there is no posture."""
     revision = f'<span id="copsense-revision" hidden>{view.revision}</span>'
     said = f'<div style="opacity:.7">{_text(status)}</div>' if status else ""
     if view.reason:

@@ -1,7 +1,7 @@
 """Server: viser's, behind a door: this machine alone, a token, its own origin, and no tunnel.
 
 Viser itself listens to the whole network, accepts any page's connection, and opens a public tunnel
-for whoever asks. What is closed here leans on its insides, so that its version is capped and the
+for every client. What is closed here leans on its insides, so that its version is capped and the
 tests knock at every door.
 """
 

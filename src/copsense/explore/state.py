@@ -31,11 +31,11 @@ class State:
     """A posture and how it is judged: `to_command` and `to_python` say the very same.
 
     Attributes:
-        words: the words that tell ``copsense analyse`` which stance it starts from: the robot and
+        words: the words that say to ``copsense analyse`` which stance it starts from: the robot and
             the options of `copsense.cli.stance_options`, or ``--stance FILE``.
         coordinates: coordinate -> its value; what is not named is not asked for.
         held: whether what is not named keeps the stance's value (``--at``, `PostureChart`); if not,
-            everything gives way and the posture is the nearest one (``--com-y``, ``--joint``), and
+            everything yields and the posture is the nearest one (``--com-y``, ``--joint``), and
             only CoM and joints can be named.
         criteria: how the load is shared, as ``--criterion`` has it; none for the stance file's, or
             the paper's two.

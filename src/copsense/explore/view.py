@@ -212,7 +212,7 @@ class View(ShortRepr):
 
     @property
     def verdict(self) -> str:
-        """What gives way first under the criterion that lasts longest, and under the others."""
+        """What yields first under the criterion that lasts longest, and under the others."""
         reach = {}
         for c in self.criteria:
             travel = np.minimum(c.com_travel, c.unloading_travel)

@@ -84,7 +84,7 @@ def reach(comparison: LogComparison) -> tuple[str, ...]:
     elif sway is not None:
         lines.append(
             "A motion without one frequency: slopes are regressions on the centre of mass, and "
-            "inertia is not told from statics by its phase."
+            "inertia is not told apart from statics by its phase."
         )
     if not np.isfinite(comparison.cops).any():
         lines.append(

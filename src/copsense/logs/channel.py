@@ -126,4 +126,4 @@ def reading(path: Path, what: str) -> Iterator[None]:
 
 
 def no_progress(_: int) -> None:
-    """Tell no one."""
+    """Report to no one."""

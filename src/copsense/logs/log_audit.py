@@ -23,12 +23,12 @@ _TILT = np.radians(1.0)  # of a foot against the first
 _BEYOND = 1.5  # rad beyond its limits, or a whole turn, that say a joint is in other units
 _SHARE = 0.02  # of the load, with the CoM in the middle
 _COM = 5e-3  # m between the total CoP and the CoM, on average
-_FAR = 0.3  # m at which that is no offset any more
+_FAR = 0.3  # m from which that is not an offset any more
 _SLOW = 1.0  # s from row to row, which no robot records at
 
 
 def check_joints(log: Log, robot: Robot) -> list[Finding]:
-    """Joints that the robot lacks, or in degrees, are errors; those that never move are told.
+    """Joints that the robot lacks, or in degrees, are errors; those that never move are reported.
 
     Raises:
         UnknownNameError: the robot has no such joint.

@@ -113,7 +113,7 @@ class LogComparison:
     def errors(self, statics: LogStatics) -> dict[str, float]:
         """Root mean square of measured less predicted: load shares, CoPs [m], torques [Nm].
 
-        The mean of the differences is taken off: offsets of sensors are no error of a criterion.
+        The mean of the differences is taken off: a sensor's offset is not an error of a criterion.
         What was not measured is left out.
         """
         found = {"load_share": _spread(self.shares - statics.shares)}

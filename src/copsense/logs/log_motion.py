@@ -214,7 +214,7 @@ def smooth_motion(
         a, b = max(0, i - 1), min(last, i + 1)
         v[i] = pin.difference(model, configurations[a], configurations[b]) / ((b - a) * step)
     acceleration = savgol_filter(v, window, 3, deriv=1, delta=step, axis=0)
-    # In a gap, and near one, the bridge's corners are no accelerations.
+    # In a gap, and near one, the bridge's corners are not accelerations.
     wide = np.array(known)
     for first, end in stretches(~known):
         wide[max(0, first - window // 2) : end + window // 2 + 1] = False

@@ -43,7 +43,7 @@ def read_log(
             recordings.
         log_map: which signal is what: a mapping, or its TOML file; default what the layout or the
             names of the signals say.
-        robot: whose log it is; tells columns by the names of its joints, and which joints slide.
+        robot: whose log it is: the names of its joints identify columns, and it says which slide.
         contacts: names of the contacts that the force sensors serve.
         rate: rows a second, each the mean of the samples around it [Hz]; default all rows, or
             100, 20 or 5 Hz where these are too many for memory.

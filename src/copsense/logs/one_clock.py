@@ -14,7 +14,7 @@ from copsense.logs.finding import Finding
 _EVEN = 1e-3  # of a step: times that differ less from equal steps are equal steps
 _GAP = 0.1  # s without a sample that are a gap, or
 _STEPS = 5.0  # as many steps, whichever is longer
-_AHEAD = 20.0  # times the length that a log's rows make up, from which a jump is no gap
+_AHEAD = 20.0  # times the length that a log's rows make up, from which a jump is not a gap
 _BURST = 0.3  # steps that much shorter than usual are samples that were delivered late, together
 _CLOSE = 0.9  # steps that late samples are spread by, of the usual one
 _BACKWARDS = 0.5  # share of the rows that a clock may lose

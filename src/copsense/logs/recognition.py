@@ -34,7 +34,7 @@ def recognise(file: LogFile, robot: Robot | None, contacts: Sequence[str] = ()) 
 
     Args:
         file: the log file.
-        robot: whose log it is: its joints and frames tell columns by their names.
+        robot: whose log it is: its joints and frames identify columns by their names.
         contacts: names or frames of the contacts that force sensors may serve.
 
     Raises:

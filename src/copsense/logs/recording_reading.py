@@ -51,7 +51,7 @@ class RecordingFile(LogFile):
                         self.add(Channel(key, len(names), names, "time", meaning))
             for contact in map(str, data["contact"].values):
                 self.add(Channel(f"wrench/{contact}", 6, (), "time", "wrench"))
-            # A planar robot's base is no pose in space.
+            # A planar robot's base is not a pose in space.
             if data["configuration"].shape[1] >= 7 + data["joint_position"].shape[1]:
                 self.add(Channel("configuration/position", 3, (), "time", "base position"))
                 self.add(Channel("configuration/rotation", 4, (), "time", "base rotation"))

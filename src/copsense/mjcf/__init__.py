@@ -36,7 +36,7 @@ def read_mjcf(description: Description) -> MjcfReading:
 def visible_shapes(description: Description) -> tuple[MjcfShape, ...] | None:
     """What MuJoCo's viewer shows of a robot at first, on the joints of its `MjcfReading`.
 
-    None where MuJoCo is not installed. The file is compiled anew: nothing else needs its triangles.
+    None where MuJoCo is not installed. Compiles the file again: nothing else needs its triangles.
     """
     if importlib.util.find_spec("mujoco") is None:
         return None

@@ -63,7 +63,7 @@ def _shape(mj: Any, tree: Tree, g: int) -> MjcfShape:
 
 
 def _faces(mj: Any, g: int) -> np.ndarray:
-    """Corners of a mesh's triangles (f, 3); none of what is no mesh."""
+    """Corners of a mesh's triangles (f, 3); none of what is not a mesh."""
     if _KINDS[int(mj.geom_type[g])] != "mesh":
         return np.zeros((0, 3), dtype=np.int64)
     mesh = int(mj.geom_dataid[g])

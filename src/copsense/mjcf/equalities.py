@@ -144,7 +144,7 @@ class Equalities:
             degree = int(np.flatnonzero(polynomial)[-1])
             return None, f"its polynomial is of degree {degree}, copsense knows straight lines"
         if first not in self.tree.joints or (second >= 0 and second not in self.tree.joints):
-            return None, "a joint of the base is no joint of the robot"
+            return None, "a joint of the base is not a joint of the robot"
         if second < 0:
             return self._pinned(first, float(polynomial[0]))
         rest = mj.qpos0[mj.jnt_qposadr[first]], mj.qpos0[mj.jnt_qposadr[second]]

@@ -1,4 +1,4 @@
-"""MjcfReading: what is read from an MJCF, whoever reads it."""
+"""MjcfReading: what is read from an MJCF, by MuJoCo or without it."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ def plot_map(
 
     Raises:
         InvalidInputError: there is no marginal, they have different criteria, `axes` are too few or
-            too many, or `color` is no color map.
+            too many, or `color` is not a color map.
     """
     if not marginals or len({m.criteria for m in marginals}) != 1:
         raise InvalidInputError(

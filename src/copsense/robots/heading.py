@@ -71,11 +71,11 @@ def facing(
     if not soles:
         left = _knees_axis(robot, q, feet)
         if left is None:
-            return None, "its feet have no soles to tell by, and its knees no axis in common"
+            return None, "its feet have no soles to show it, and its knees no axis in common"
         ahead = np.array([left[1], -left[0]])
         # Forward rather than backward, left rather than right.
         ahead = ahead if ahead @ (1.0, 0.1) > 0 else -ahead
-        return _quarter(ahead), "its knees turn across; nothing tells ahead from behind"
+        return _quarter(ahead), "its knees turn across; nothing distinguishes ahead from behind"
     ahead = np.mean([(f.middle - data.oMi[f.joint].translation)[:2] for f in soles], axis=0)
     plain = _AHEAD * max(max(foot.sole.size) for foot in soles if foot.sole is not None)
     why = "its soles reach ahead of the ankles"
@@ -87,7 +87,7 @@ def facing(
         if abs(along) < plain:
             # Forward rather than backward, left rather than right.
             ahead = across if across @ (1.0, 0.1) > 0 else -across
-            why = "its feet stand beside each other; its soles do not tell ahead from behind"
+            why = "its feet stand beside each other; its soles do not distinguish ahead from behind"
     elif np.linalg.norm(ahead) < plain:
         return None, "its soles reach as far behind the ankles as ahead of them"
     return _quarter(ahead), why

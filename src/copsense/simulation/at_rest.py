@@ -1,4 +1,4 @@
-"""at_rest_note: what gives way where a robot stands already, before any motion, and what would not.
+"""at_rest_note: what yields where a robot stands already, before any motion, and what would not.
 
 A criterion without limits may want a centre of pressure outside its sole, or a contact that pulls.
 No ground does that: it acts otherwise, and the robot may tip at once, whatever its controller does.
@@ -45,7 +45,7 @@ def at_rest_note(
             "no wrenches within what soles and friction allow balance it. Move the CoM over the "
             "feet."
         )
-    except CopsenseError:  # what cannot be told is not proposed
+    except CopsenseError:  # what cannot be solved is not proposed
         pass
     try:
         if criterion.name != other.name and not _broken(

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from copsense.simulation.recording import Recording
 
 
-_HARMONICS = (1, 2, 3)  # fitted; the first is told
+_HARMONICS = (1, 2, 3)  # fitted; the first is reported
 
 
 def compare_sway(recording: Recording) -> dict[str, dict[str, dict[str, tuple[float, float]]]]:

@@ -48,7 +48,7 @@ def with_tie_breaks(
 ) -> tuple[dict[str, C], tuple[str, ...]]:
     """Criteria with the tie-breaks that they need at any of some stances, and what to say of them.
 
-    One that stays undetermined even so is left as it is: whoever solves for it says why.
+    One that stays undetermined even so is left as it is: solving for it raises, and says why.
     """
     found = dict(criteria)
     for stance in stances:

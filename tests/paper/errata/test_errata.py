@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from copsense.errors import InvalidInputError
+from copsense.paper.claims import Verdict
+from copsense.paper.claims.modelling_claims import MODELLING_CLAIMS
 from copsense.paper.closed_form import FourBar
 from copsense.paper.errata import ERRATA, evaluate_errata
+from copsense.paper.errata.errata_forms import handedness
 
 
 def measured():
@@ -72,3 +78,21 @@ def test_the_numbers_that_hide_kappa_three_fifths_agree_there():
 def test_errata_of_a_linkage_too_short_to_unload_a_foot_are_rejected():
     with pytest.raises(InvalidInputError, match="shorter rod or longer legs"):
         evaluate_errata(FourBar(rod_length=0.4))
+
+
+def test_what_is_said_of_hands_is_what_their_forms_show(discrepancies):
+    """Forms of one hand are off in the other; Eq. (28), which the claim evaluates in both, is not.
+
+    The documentation takes its table from the data and names no hand of a form itself.
+    """
+    (erratum,) = [row for row in ERRATA if row.check is handedness]
+    assert discrepancies[erratum.equation].as_printed > 0.01  # the least of the forms
+    assert "(28)" not in erratum.equation
+    assert erratum.note == "(28) holds in either"
+    (claim,) = [row for row in MODELLING_CLAIMS if row.identifier == "eq-28"]
+    found = claim.check(FourBar())
+    assert "in both hands" in found.explanation
+    assert found.verdict is Verdict.HOLDS
+    theory = Path(__file__).parents[3] / "docs" / "theory.md"
+    lines = theory.read_text("utf-8").splitlines()
+    assert not [line for line in lines if re.search(r"\(\d\d\).*in S[+-]", line)]

@@ -157,7 +157,7 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
         np.array([p.translation for p in stance.placements]),
         np.array([p.rotation for p in stance.placements]),
         slopes,
-        # Where the stance stands is allowed: whoever made it has heard of it.
+        # Where the stance stands is allowed: its caller has been warned.
         np.minimum(low, own),
         np.maximum(high, own),
     )

@@ -75,7 +75,7 @@ def reproduce_paper(
         raise InvalidInputError("the section on limits needs one. Switch one on.")
     if any(isinstance(limit, Mapping) for limit in limits.to_dict().values()):
         raise InvalidInputError(
-            "the report tells limits that are alike at every contact and joint. Give numbers."
+            "the report states limits that are the same at every contact and joint. Give numbers."
         )
     clock = Clock(progress)
     # First: a log that does not fit is rejected before minutes of work.
