@@ -13,7 +13,7 @@ from copsense.explore.view import View
 from copsense.posture_run import PostureRun
 
 _HEIGHT = 150  # pixels
-_DEEPEST = {"mm": 40.0, "%": 20.0}  # what is shown below zero: far outside nobody compares
+_DEEPEST = {"mm": 40.0, "%": 20.0}  # what is shown below zero: far outside no one compares
 
 
 class MarginPlot:
@@ -28,7 +28,7 @@ class MarginPlot:
         """
         self._gui, self._run = gui, run
         self._place = gui.add_folder(None)
-        # One for each number of curves: what is removed may still be told something.
+        # One for each number of curves: what is removed may still get a message.
         self._plots: dict[int, Any] = {}
 
     def show(self, view: View, colours: Mapping[str, Colour]) -> None:
@@ -40,7 +40,7 @@ class MarginPlot:
             self._show_only(-1)
             return
         over, y, now = self._axis(view)
-        # What cannot be told here has a curve, perhaps, but no colour.
+        # What has no answer here has a curve, perhaps, but no colour.
         known = [name in colours for name in view.curve_criteria]
         rows = [row * scale for row, on in zip(curves, known, strict=True) if on]
         lines = tuple((n, colours[n]) for n in view.curve_criteria if n in colours)

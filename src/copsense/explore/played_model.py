@@ -51,7 +51,7 @@ class PlayedModel(Model):
         return self.run.at(self.row)
 
     def view(self, state: State, revision: int = 0, last: View | None = None) -> View:
-        """What the row looks like; where no criterion can be told, the robot without them."""
+        """What the row looks like; where no criterion has an answer, the robot without them."""
         row = self.row
         here, measured = self.run.at(row), self._measured(row)
         try:

@@ -66,7 +66,7 @@ def _foretold(recording: Recording, scenario: Scenario, prediction: StaticPredic
     if prediction is None:
         return ""
     if prediction.at_rest:
-        return "the posture cannot be held at rest so; a note says what gives way, and what can."
+        return "the posture cannot be held at rest so; a note says what yields, and what can."
     if recording.tip is None or not isinstance(scenario.reference, PathReference):
         return ""
     travel, fast = recording.tip_travel, prediction.quasi_static
