@@ -190,7 +190,7 @@ def _serve(
     with Explorer(
         model, state, port=port, host=host, meshes=meshes, light=light, dark=dark
     ) as explorer:
-        # Background jobs of a shell ignore SIGINT; one that is sent, or a SIGTERM, is meant to end it.
+        # Background jobs of a shell ignore SIGINT; one that is sent, or a SIGTERM, is to end it.
         for each in (signal.SIGINT, signal.SIGTERM):
             signal.signal(each, lambda *_: over.set())
         if as_json:
