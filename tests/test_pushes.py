@@ -68,7 +68,7 @@ def test_the_largest_push_is_where_a_load_first_breaks_a_limit(at_com, icub, ang
             middle = (low + high) / 2
             low, high = (middle, high) if slack(middle, criterion) >= 0 else (low, middle)
         assert region.largest(u) == pytest.approx(low, abs=1e-6)
-        name = region.gives_way(u)
+        name = region.limited_by(u)
         pushed = icub.with_loads([Load("root_link", (*(low * u), 0.0), point=point)])
         A, b = rows.over_forces(LoadProblem.of(pushed))
         tight = b - A @ solve_equilibrium(pushed, criterion).forces

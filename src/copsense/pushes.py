@@ -86,7 +86,7 @@ class PushRegion(ShortRepr):
             raise InvalidInputError("the direction of a push is zero. Give world x and y.")
         return self._crossing(u / length)[0]
 
-    def yields(self, direction: ArrayLike) -> str:
+    def limited_by(self, direction: ArrayLike) -> str:
         """What limits the largest push along a direction; empty where it is not known."""
         u = finite_array(direction, "the direction of a push", (2,), "world x, y")
         edge = self._crossing(u / max(float(np.linalg.norm(u)), 1e-300))[1]
@@ -112,10 +112,10 @@ class PushRegion(ShortRepr):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data: the polygon, and the weakest direction."""
-        force, angle, yields = self.weakest
+        force, angle, limited_by = self.weakest
         return {
             "polygon": self.polygon.tolist(),
-            "weakest": {"force": force, "direction": angle, "yields": yields},
+            "weakest": {"force": force, "direction": angle, "limited_by": limited_by},
         }
 
 
@@ -179,9 +179,9 @@ class Pushes(ShortRepr):
         ]
         for region in self.regions:
             along = [region.largest(u) for u in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-            force, angle, yields = region.weakest
+            force, angle, limited_by = region.weakest
             told = f"{_degrees(angle):+5d} deg" if region.stands else "does not stand"
-            told += f": {yields}" if yields else ""
+            told += f": {limited_by}" if limited_by else ""
             numbers = " ".join(f"{value:7.1f}" for value in along)
             lines.append(f"{region.name:26} {numbers} {force:9.1f}  {told}")
         return "\n".join(lines)

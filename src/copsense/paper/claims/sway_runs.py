@@ -11,7 +11,6 @@ from jaxtyping import Float
 
 from copsense.limits import Limits
 from copsense.simulation import Recording
-from copsense.simulation.sway_comparison import along_path
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +90,12 @@ def stretch(recording: Recording) -> Stretch:
     y = recording["com"].sel(com_axis="y")
     start = float(y[0])
     com_y = standing["com"].sel(com_axis="y").values - start
-    static = recording["static_cop"].values[:, order, 1]
+    travel, static = recording["static_travel"].values, recording["static_cop"].values[:, order, 1]
     return Stretch(
         standing["time"].values,
         com_y,
         standing["wrench"].sel(component="fz").values[:, order] / recording.attrs["weight"],
         standing["cop"].values[:, order, 1],
-        np.stack([along_path(recording, com_y, foot) for foot in static.T], axis=1),
+        np.stack([np.interp(com_y, travel, foot) for foot in static.T], axis=1),
         standing["margin"].values[:, order],
     )

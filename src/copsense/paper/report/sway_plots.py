@@ -26,7 +26,6 @@ from copsense.plots.style import (
 )
 from copsense.polygon import Polygon
 from copsense.simulation import Recording
-from copsense.simulation.sway_comparison import along_path
 
 _FEET = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 _TIP: dict[str, Any] = {"color": "#b3261e", "linewidth": 1.1, "linestyle": (0, (4, 2))}
@@ -56,6 +55,7 @@ def plot_sway_cop(recording: Recording, *, ax: Axes | None = None, legend: bool 
     names, origins = labels(recording, "contact"), contact_origins(recording)
     soles, time = world_soles(recording), recording["time"].values
     y = recording["com"].sel(com_axis="y").values
+    travel = recording["static_travel"].values
     for k in range(len(names)):
         sole, turn = soles[k], recording["contact_rotation"].values[k, 1, :2]
         if sole is not None:
@@ -66,7 +66,7 @@ def plot_sway_cop(recording: Recording, *, ax: Axes | None = None, legend: bool 
                     ax.axhline(edge, **EDGE_LINE)
         world = origins[k, 1] + recording["cop"].values[:, k] @ turn * MM
         static = origins[k, 1] + recording["static_cop"].values[:, k] @ turn * MM
-        ax.plot(time, along_path(recording, y - y[0], static), **STATIC_LINE)
+        ax.plot(time, np.interp(y - y[0], travel, static), **STATIC_LINE)
         ax.plot(time, world, color=_FEET[k % len(_FEET)], linewidth=1.5, zorder=2.5)
     ax.plot(time, y * MM, **COM_LINE)
     edges = np.vstack([origins, *(s for s in soles if s is not None)])[:, 1]
