@@ -14,17 +14,17 @@ what it has no meaning for.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from copsense.arrays import finite_array, finite_number
+from copsense.arrays import check_keys, finite_array, finite_number
 from copsense.content import ByContent, FrozenMapping, plain
 from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError
+from copsense.files import read_toml
 from copsense.magnitudes import check_length
-from copsense.robots.stance_tables import known, list_of, read_payload, table_of
+from copsense.robots.stance_tables import list_of, read_payload, table_of
 from copsense.stance import Stance
 
 LINK_KEYS = ("mass_percent", "mass_kg", "com_m")
@@ -142,7 +142,7 @@ class Uncertainty(ByContent):
             InvalidInputError: a value that is not a standard deviation.
         """
         table = table_of(data, "an uncertainty")
-        known(table, tuple(f.name for f in fields(cls)), "an uncertainty")
+        check_keys(table, tuple(f.name for f in fields(cls)), "an uncertainty")
         for name in (*_TABLES, "ground"):
             inner = table_of(table.get(name, {}), name)
             for of, each in inner.items() if name in _TABLES else ():
@@ -159,16 +159,8 @@ class Uncertainty(ByContent):
             UnknownNameError: a key that such a file does not have.
             InvalidInputError: a value that is not a standard deviation.
         """
-        where = Path(path)
-        try:
-            data = tomllib.loads(where.read_text(encoding="utf-8-sig"))
-        except OSError as error:
-            raise ModelLoadError(
-                f"the uncertainty {where} cannot be read: {error.strerror}. Give a .toml file of "
-                'standard deviations, or "default".'
-            ) from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise ModelLoadError(f"{where} is not TOML: {error}. Correct the file.") from None
+        where, remedy = Path(path), 'Give a .toml file of standard deviations, or "default".'
+        data = read_toml(where, "uncertainty", remedy, ModelLoadError)
         try:
             return cls.from_dict(data)
         except CopsenseError as error:
@@ -209,7 +201,7 @@ DEFAULT: dict[str, Any] = {
 
 def _checked(table: Mapping[str, Any], keys: Sequence[str], where: str) -> dict[str, Any]:
     """A table with its numbers checked; of ``com_m`` three of them."""
-    known(table, keys, where)
+    check_keys(table, keys, where)
     if "mass_percent" in table and "mass_kg" in table:
         raise InvalidInputError(f"{where} has mass_percent and mass_kg. Give one of them.")
     found: dict[str, Any] = {}
