@@ -126,7 +126,7 @@ BAD = {
     "payloads = 3": "payloads is 3. Write a list",
     '[[payloads]]\nframe = "l_hand"': "mass_kg of a payload is None",
     '[[payloads]]\nframe = "l_hand"\nmass_kg = -1': "mass_kg of the payload at 'l_hand' is -1",
-    "[links.chest": "is not TOML",
+    "[links.chest": "is not valid TOML",
 }
 
 
@@ -139,7 +139,7 @@ def test_a_file_that_is_wrong_says_what(tmp_path, text):
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ModelLoadError, match=r"absent.toml cannot be read"):
+    with pytest.raises(ModelLoadError, match=r"no uncertainty at .*absent.toml. Give a .toml file"):
         Uncertainty.read(tmp_path / "absent.toml")
 
 

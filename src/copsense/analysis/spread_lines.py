@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 _SCALES = {"m": (1e3, "mm"), "N": (1.0, "N"), "N m": (1.0, "N m")}
-_LEAST = 0.005  # of a variance, that is told
+_LEAST = 0.005  # of a variance, that is listed
 _STILL = 1e-8  # m
 
 

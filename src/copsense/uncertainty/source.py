@@ -72,7 +72,7 @@ class Source:
 
     @property
     def group(self) -> str:
-        """What its share of the variance is told under."""
+        """What its share of the variance is listed under."""
         return GROUPS[self.kind]
 
     @property
