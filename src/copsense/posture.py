@@ -183,8 +183,8 @@ def contact_motions(
 ) -> tuple[Float[np.ndarray, "nv m"], Bool[np.ndarray, " m"]]:
     """How the posture follows contacts whose places move, its CoM over the same point.
 
-    The tangents of ``solve_posture(stance, com=(x, y, None), targets=...)``: joints and trunk give
-    way as little as its cost allows.
+    The tangents of ``solve_posture(stance, com=(x, y, None), targets=...)``: joints and trunk yield
+    as little as its cost allows.
 
     Args:
         stance: robot, posture and contacts, at rest.

@@ -96,7 +96,7 @@ def _run() -> int:
 
 def _unloadable(error: ImportError) -> str:
     """What is missing when a package that copsense needs is there and cannot be loaded."""
-    remedy = "Install it anew: pip install --force-reinstall copsense."
+    remedy = "Install it again: pip install --force-reinstall copsense."
     if ".so" in str(error):
         # Pinocchio's wheels take OpenMP from the system, which slim containers leave out.
         remedy = "Install that library of the system (libgomp on Debian: apt install libgomp1)."

@@ -127,7 +127,7 @@ def nearest(limits: KernelLimits, p: Programs, n: int, soft: bool, tolerance: fl
         if not p.slack[new] * scale < -tolerance:
             return q
         for k in range(q):
-            if p.held[k] == new:  # rounding: whoever calls verifies the optimum
+            if p.held[k] == new:  # rounding: the caller verifies the optimum
                 return q
         write_row(limits, p, new, n, soft)
         missing, pressure, length = -p.slack[new], 0.0, 0.0
