@@ -139,7 +139,9 @@ def test_a_file_that_is_wrong_says_what(tmp_path, text):
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ModelLoadError, match=r"no uncertainty at .*absent.toml'. Give a .toml file"):
+    with pytest.raises(
+        ModelLoadError, match=r"no uncertainty at .*absent.toml'. Give a .toml file"
+    ):
         Uncertainty.read(tmp_path / "absent.toml")
 
 
