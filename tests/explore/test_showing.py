@@ -28,7 +28,7 @@ def words(page):
 
 def test_a_notebook_draws_a_stance_in_a_cell(icub, tmp_path):
     shown = icub.show()
-    assert shown.height == 720
+    assert shown.height == 840
     notebook = tmp_path / "notebook.html"
     notebook.write_text(f"<!doctype html><body>{shown._repr_html_()}</body>", encoding="utf-8")
     place = Model(icub).view(Model(icub).start)["minimum-wrench"].cop_world[0]

@@ -211,3 +211,15 @@ def test_notebooks_show_axes_and_figures(swept, compared):
 def test_a_map_of_no_color_is_said():
     with pytest.raises(InvalidInputError, match="not a color map of Matplotlib"):
         plots.plot_map(marginals(), color="rainbowish")
+
+
+@pytest.mark.parametrize(("name", "side"), [("icub", "behind"), ("solo12", "right")])
+def test_a_robots_legend_is_in_its_figure(stance_of, name, side):
+    stance = stance_of(name)
+    found = [copsense.cop_sensitivity(stance, criterion) for criterion in (WRENCH, TORQUE)]
+    figure = plots.plot_robot(stance, found, side=side).figure
+    figure.draw_without_rendering()
+    inside, whole = figure.axes[0].get_tightbbox(), figure.bbox
+    assert min(inside.x0, inside.y0) >= 0
+    assert inside.x1 <= whole.x1
+    assert inside.y1 <= whole.y1

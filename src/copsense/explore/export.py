@@ -192,8 +192,8 @@ def _run_body(model: PlayedModel, rows: Sequence[int], views: Sequence[View]) ->
     ]
     marks = f'<p class="marks">{marks_words(run)}</p>'
     said = (
-        f"{run.source}: {len(run)} postures, {run.axis} from {ends}; {len(views)} of them are "
-        "shown. Play, scrub and speed are in the bar under the picture."
+        f"{run.source}: {len(run)} postures, {run.axis} from {ends}, in {len(views)} frames. "
+        "Play, scrub and speed are in the bar under the picture."
     )
     return f"<p>{_text(said)}</p>", f"{marks}{_table(_FILM_HEADS, table, colours)}"
 

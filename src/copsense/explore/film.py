@@ -14,8 +14,9 @@ _NEAR = 0.8  # of the distance of a window's camera: a page's picture is smaller
 # Without a GPU viser's client says so over the picture, though the picture is all there is.
 _QUIET = "<style>.mantine-Notification-root{display:none!important}</style>"
 _DARK = (
-    '<script>if(matchMedia("(prefers-color-scheme: dark)").matches){{'
-    'window.__VISER_EMBED_DATA__="{}";window.__VISER_EMBED_CONFIG__={{darkMode:true}};}}</script>'
+    '<script>const dark=matchMedia("(prefers-color-scheme: dark)");if(dark.matches){{'
+    'window.__VISER_EMBED_DATA__="{}";window.__VISER_EMBED_CONFIG__={{darkMode:true}};}}'
+    'dark.addEventListener("change",()=>location.reload());</script>'
 )
 
 

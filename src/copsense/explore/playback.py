@@ -131,14 +131,14 @@ def run_seconds(run: PostureRun) -> float:
 
 
 def frame_rows(run: PostureRun, rate: float = 25.0) -> tuple[list[int], float]:
-    """Rows to show one after the other, and the seconds between them.
+    """Rows to show one after the other, evenly in what they are along, and the seconds between.
 
     Args:
         run: the postures.
-        rate: frames a second.
+        rate: frames a second, at most.
     """
     seconds = run_seconds(run)
-    count = max(2, min(math.ceil(seconds * rate) + 1, _MOST))
+    count = max(2, min(math.ceil(seconds * rate) + 1, _MOST, len(run)))
     wanted = np.linspace(run.values[0], run.values[-1], count)
     rows = [int(np.argmin(np.abs(run.values - value))) for value in wanted]
     return rows, max(seconds, 1e-3) / (count - 1)

@@ -68,7 +68,7 @@ def show(
     criteria: Sequence[Criterion] | None = None,
     limits: Limits | None = None,
     meshes: bool = False,
-    height: int = 720,
+    height: int = 840,
     rate: float = RATE,
     advance: Callable[[int], object] = lambda _: None,
 ) -> ShownPage:

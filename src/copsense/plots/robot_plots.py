@@ -37,6 +37,8 @@ RING: dict[str, Any] = {
     "linestyle": "none",
 }
 _ROOM = 0.06  # of the picture's larger side, around it
+_BESIDE = 2.2  # inches that the legend beside the robot takes
+_FLAT = 0.9  # of its width: lower robots have wider figures
 _NARROWEST = 0.45  # of its height
 
 
@@ -70,13 +72,13 @@ def plot_robot(
     """
     if side not in SIDES:
         raise InvalidInputError(f"a robot is seen from {', '.join(SIDES)}, not from {side!r}.")
-    ax = axes_or_new(ax, 3.6, 4.2)
-    shared = ax.has_data()
     names = [criterion_name(s.equilibrium.criterion) for s in sensitivities]
     ink = looks(["robot"], color).colour["robot"] if isinstance(color, str) else INK
     colour = looks(names, color if isinstance(color, Mapping) else None).colour
     across = 1 if side == "behind" else 0
     bones, com, places = skeleton(stance) * MM, stance.com * MM, stance.placements
+    ax = axes_or_new(ax, *_size(bones, across, legend))
+    shared = ax.has_data()
     draw_bones(ax, bones, across, color=ink)
     ground = min(float(place.translation[2]) for place in places) * MM
     outlines = []
@@ -105,6 +107,14 @@ def plot_robot(
         handles = with_legend(ax, [*mine, *_handles(colour)])
         ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
+
+
+def _size(bones: Float[np.ndarray, "s 2 3"], across: int, legend: bool) -> tuple[float, float]:
+    """Width and height of a figure of its own [inches], after the robot's shape from there."""
+    sides = np.ptp(bones.reshape(-1, 3), axis=0)
+    high = float(sides[2]) / max(float(sides[across]), 1.0)
+    wide, tall = (3.0, 4.2) if high > _FLAT else (4.8, 1.5 + 3.0 * high)
+    return wide + _BESIDE * legend, tall
 
 
 def draw_bones(
