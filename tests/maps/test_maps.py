@@ -182,7 +182,15 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
                     copsense.solve_equilibrium(here, criterion, limits)
             else:
                 assert reason == ""
-                copsense.solve_equilibrium(here, criterion, limits)
+                within = copsense.cop_sensitivity(here, criterion, limits)
+                presses = len(within.equilibrium.pressing)
+                assert dataset["active_limits"].values[row, j] == presses
+                for column, value in (
+                    ("cop_within", within.cop),
+                    ("com_gain_within", within.com_gain),
+                ):
+                    stored = dataset[column].values[row, j]
+                    np.testing.assert_allclose(stored, value, rtol=1e-5, atol=1e-6)
 
 
 def test_feet_and_joints_are_coordinates_too(icub, both, tmp_path):

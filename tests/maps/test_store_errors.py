@@ -81,7 +81,7 @@ def test_a_store_that_a_future_version_made_says_so(whole, icub, both, sample, t
     group = zarr.open_group(path, mode="r+")
     parameters = json.loads(group.attrs["copsense_map"]) | {"format": 99}
     group.attrs["copsense_map"] = json.dumps(parameters)
-    with pytest.raises(OutputError, match="format is 99 there, 2 here"):
+    with pytest.raises(OutputError, match="format is 99 there, 3 here"):
         copsense.map_postures(icub, sample, both, path, chunk=32)
 
 

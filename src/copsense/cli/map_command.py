@@ -131,7 +131,7 @@ def map_command(
     pair = _pair(plot_over, sampling.names)
     plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations)
     echo_notes(note for note in plan.notes if note not in stance.robot.notes)
-    kernel = BatchKernel(stance, plan.criteria)
+    kernel = BatchKernel(stance, plan.criteria, plan.limits)
     with waiting("compiling"):
         PostureChart(stance, sampling.names).compile()
         kernel.compile()

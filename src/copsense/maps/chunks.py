@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
-from copsense.errors import CopsenseError, InfeasibleError
 from copsense.magnitudes import check_angle
 from copsense.maps.columns import (
     EVALUATED,
@@ -23,9 +22,8 @@ from copsense.maps.map_plan import MapPlan
 from copsense.maps.reduction import reduce_chunk
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore
-from copsense.margins import MarginTable, margin_table
+from copsense.margins import margin_table
 from copsense.reach import SWEPT, check_within_reach
-from copsense.statics import solve_equilibrium
 
 _PIECE = 4096  # postures that the kernel is given at a time
 
@@ -50,7 +48,10 @@ class ChunkEvaluator:
         self._kernel = BatchKernel(plan.stance, plan.criteria)
         self._names = tuple(coordinate_columns(plan))
         self._columns = columns(plan)
-        self._table = None if plan.limits is None else margin_table(plan.stance, plan.limits)
+        self._within: BatchKernel | None = None
+        if plan.limits is not None:
+            self._within = BatchKernel(plan.stance, plan.criteria, plan.limits)
+            self._kinds = limit_kinds(margin_table(plan.stance, plan.limits))
 
     def fill(self, store: MapStore, index: int) -> None:
         """Evaluate a chunk and write it, its mark last."""
@@ -106,36 +107,38 @@ class ChunkEvaluator:
             "load_share": result.load_share,
             "com": result.com,
         }
-        if self._table is not None:
-            answers["limit_margin"] = self._limits(self._table, configurations, result, rows, found)
+        if self._within is not None:
+            answers |= self._limits(self._within, configurations, result, rows, found)
         return answers
 
     def _limits(
         self,
-        table: MarginTable,
+        within: BatchKernel,
         configurations: np.ndarray,
-        result: BatchResult,
+        own: BatchResult,
         rows: np.ndarray,
         found: Chunk,
-    ) -> np.ndarray:
-        """Margins of the criteria's own wrenches; marks the postures that the QP cannot solve."""
-        status, reason = found["status"], found["reason"]
-        kinds = limit_kinds(table)
-        members = [np.array([k == kind for k in table.kinds]) for kind in kinds]
-        margins = np.full((len(configurations), len(self.plan.criteria), len(kinds)), np.nan)
-        for i, q in enumerate(configurations):
-            here = self.plan.stance.at(q, check=False)
-            for j, criterion in enumerate(self.plan.criteria):
-                if status[rows[i], j] != EVALUATED:
-                    continue
-                own = table.values(here.stack(result.wrenches[i, j]), result.torques[i, j])
-                margins[i, j] = [own[those].min() for those in members]
-                try:
-                    solve_equilibrium(here, criterion, self.plan.limits)
-                except CopsenseError as error:
-                    broken = INFEASIBLE if isinstance(error, InfeasibleError) else UNSOLVED
-                    status[rows[i], j], reason[rows[i], j] = broken, str(error)
-        return margins
+    ) -> Chunk:
+        """The same postures within the limits; marks those where no wrench was found."""
+        result = within.limited(configurations, own)
+        limits, status, reason = result.limits, found["status"], found["reason"]
+        assert limits is not None
+        for (i, j), why in result.reasons.items():
+            state = limits.states[limits.state[i, j]]
+            if (i, j) in own.reasons or state == "unloaded":  # wrenches there are
+                continue
+            status[rows[i], j] = INFEASIBLE if state == "infeasible" else UNSOLVED
+            reason[rows[i], j] = why
+        kinds = np.array([kind for _, kind in limits.margin_names])
+        margins = [limits.own_margins[..., kinds == kind].min(axis=-1) for kind in self._kinds]
+        return {
+            "limit_margin": np.stack(margins, axis=-1),
+            "active_limits": np.where(
+                np.isnan(result.cops).any(axis=(-1, -2)), -1, (limits.pressing >= 0).sum(axis=-1)
+            ),
+            "cop_within": result.cops,
+            "com_gain_within": result.com_gain,
+        }
 
 
 def _largest_singular_value(G: np.ndarray) -> np.ndarray:

@@ -90,6 +90,21 @@ _LIMIT_MARGIN = Column(
     "smallest distance of the criterion's own wrenches to the limits of each kind; negative where "
     "they break the limits",
 )
+_WITHIN = {
+    "limit_margin": _LIMIT_MARGIN,
+    "active_limits": Column(
+        _EACH, "int16", "", "number of limits that press within the limits; -1 where not evaluated"
+    ),
+    "cop_within": Column(
+        (*_EACH, "contact", "axis"), "float32", "m", "centre of pressure within the limits"
+    ),
+    "com_gain_within": Column(
+        (*_EACH, "contact", "axis", "com_direction"),
+        "float32",
+        "1",
+        "d CoP / d CoM within the limits, those that press held",
+    ),
+}
 _CONFIGURATION = Column(
     ("posture", "configuration_index"),
     "float64",
@@ -101,7 +116,7 @@ _CONFIGURATION = Column(
 def coordinate_columns(plan: MapPlan) -> dict[str, Column]:
     """A column for each of the map's coordinates, in their order."""
     chart = PostureChart(plan.stance, plan.sampling.names)
-    taken = {*_COLUMNS, "limit_margin", "configuration", "done", "posture", "criterion", "contact"}
+    taken = {*_COLUMNS, *_WITHIN, "configuration", "done", "posture", "criterion", "contact"}
     found: dict[str, Column] = {}
     for name, unit in zip(chart.names, chart.units, strict=True):
         plain = variable_name(name, taken | set(found))
@@ -113,7 +128,7 @@ def columns(plan: MapPlan) -> dict[str, Column]:
     """Every column with a value for each posture, the coordinates first."""
     found = coordinate_columns(plan) | _COLUMNS
     if plan.limits is not None:
-        found["limit_margin"] = _LIMIT_MARGIN
+        found |= _WITHIN
     if plan.configurations:
         found["configuration"] = _CONFIGURATION
     return found

@@ -18,7 +18,7 @@ from copsense.provenance import model_digest, plain
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, with_tie_breaks
 
-FORMAT = 2  # of the store; counted up when what is written changes
+FORMAT = 3  # of the store; counted up when what is written changes
 _SMALL, _LARGE, _MANY = 4096, 16384, 16  # postures of a chunk; the large ones from 16 chunks on
 
 

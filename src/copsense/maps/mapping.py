@@ -54,8 +54,8 @@ def map_postures(
         sampling: a `Grid` or a `Sample` over coordinates of `copsense.batch.PostureChart`.
         criteria: of distinct names.
         path: of the store, ending in ``.zarr``; its folder must exist.
-        limits: the QP solves for wrenches within them at every posture, which takes milliseconds
-            each; travels, gains and margins remain those of the criterion's own wrenches.
+        limits: wrenches within them are solved for at every posture, and CoPs and gains within them
+            are columns of their own; the others remain those of the criterion's own wrenches.
         chunk: postures that are evaluated, written and resumed as one; default 4096, in large maps
             16384.
         configurations: store the configurations too.

@@ -164,6 +164,25 @@ def test_a_row_does_not_depend_on_the_others(answers, case):
     same_bits(kernel.evaluate(q, out=out), found)
 
 
+def test_results_without_limits_are_put_within_them(answers, case):
+    stance, q, limits, found = answers("icub")
+    assert (found.limits.state == INFEASIBLE).any()
+    free = BatchKernel(stance, served(stance))
+    kernel = BatchKernel(stance, served(stance), limits)
+    limited = kernel.limited(q, free.evaluate(q))
+    same_bits(limited, found)
+    assert limited.reasons == found.reasons
+    for i in range(len(q)):  # in a loop infeasible postures are said to be so too
+        single = kernel.one(q[i])
+        assert {(i, j): why for (_, j), why in single.reasons.items()} == {
+            (row, j): why for (row, j), why in found.reasons.items() if row == i
+        }
+    with pytest.raises(copsense.errors.InvalidInputError, match="own is BatchResult"):
+        kernel.limited(q[:2], free.evaluate(q))
+    with pytest.raises(copsense.errors.InvalidInputError, match="the batch has no limits"):
+        free.limited(q, free.evaluate(q))
+
+
 def test_a_hand_that_would_have_to_pull_is_left_without_load(icub):
     # The wall is on the wrong side of the hand: all that limits leave it is nothing.
     stance = with_hand(off_centre(icub), "l_hand", (1, -0.2, -0.1))

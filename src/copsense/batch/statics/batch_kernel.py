@@ -121,6 +121,7 @@ class BatchKernel:
             if isinstance(criterion, Criterion):
                 criterion.at(stance)  # weights that do not fit are an error, not a failed row
         served = kernel_criteria(stance, () if self.fallback_reason else self.criteria)
+        self._served = served.column
         self._serves_all = len(served.column) == len(self.criteria)
         lines = [c.name for c in stance.contacts if c.sole is not None and len(c.sole) == 2]
         if not self.fallback_reason and lines:
@@ -178,6 +179,45 @@ class BatchKernel:
             self._fill(q, result, doubtful, threads)
         return self._answered(q, result, doubtful)
 
+    def limited(
+        self, configurations: ArrayLike, own: BatchResult, *, threads: int = 1
+    ) -> BatchResult:
+        """Results without limits put within the limits: what `evaluate` gives, for half its work.
+
+        Args:
+            configurations: one in each row (N, nq).
+            own: of the same criteria at these configurations, from a batch without limits. What
+                failed there fails here.
+            threads: as of `evaluate`.
+
+        Raises:
+            InvalidInputError: the batch has no limits, or `own` is of other criteria or postures.
+        """
+        q = self._checked(configurations)
+        if self.limits is None:
+            raise InvalidInputError("the batch has no limits. Give them to BatchKernel.")
+        result = self.empty(len(q))
+        given, wanted = arrays_of(own), arrays_of(result)
+        if own.criteria != self.names or any(a.shape != wanted[n].shape for n, a in given.items()):
+            raise InvalidInputError(
+                f"own is {own!r}, and not of the {len(q)} configurations and the criteria "
+                f"{', '.join(self.names)}. Give the result of a batch without limits at these."
+            )
+        for name, array in given.items():
+            wanted[name][...] = array
+        left = np.full((len(q), len(self.names)), bool(self.fallback_reason))
+        failed = np.zeros_like(left)
+        for row, column in own.reasons:
+            failed[row, column] = True
+        if not self.fallback_reason:
+            left[:] = ~np.isin(np.arange(len(self.names)), self._served)
+        doubtful = (left | failed).astype(np.uint8)
+        if not self.fallback_reason and len(q):
+            self._fill(q, result, doubtful, whole_number(threads, "threads"), within=True)
+        doubtful[failed] = 0
+        answered = self._answered(q, result, doubtful)
+        return replace(answered, reasons={**answered.reasons, **own.reasons})
+
     def one(self, q: np.ndarray) -> BatchResult:
         """Evaluate one configuration (nq,), for a controller's loop: no array is allocated.
 
@@ -195,9 +235,18 @@ class BatchKernel:
         self.stance.robot.check_configuration(row)
         return self._answered(single.q, single.result, single.doubtful)
 
-    def _fill(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, threads: int) -> None:
-        """Have the kernel fill the results, block by block."""
-        fill_blocks(lambda: self._filling(q, result, doubtful, _CHUNK), len(q), _CHUNK, threads)
+    def _fill(
+        self,
+        q: np.ndarray,
+        result: BatchResult,
+        doubtful: np.ndarray,
+        threads: int,
+        *,
+        within: bool = False,
+    ) -> None:
+        """Have the kernel fill the results, block by block, or only put them `within` limits."""
+        make = self._limiting if within else self._filling
+        fill_blocks(lambda: make(q, result, doubtful, _CHUNK), len(q), _CHUNK, threads)
 
     def _filling(
         self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, block: int
@@ -209,13 +258,20 @@ class BatchKernel:
         fill = partial(self._kernel.filling(q, result, doubtful), self._kernel.workspace())
         if self.limits is None:
             return fill
-        limit, memory = self._within.filling(q, result, doubtful), self._within.workspace(block)
+        limit = self._limiting(q, result, doubtful, block)
 
         def both(start: int, stop: int) -> bool:
             fill(start, stop)
-            return limit(*memory, start, stop)
+            return limit(start, stop)
 
         return both
+
+    def _limiting(
+        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, block: int
+    ) -> Callable[[int, int], bool]:
+        """The same for rows that the kernel without limits has filled."""
+        memory = self._within.workspace(block)
+        return partial(self._within.filling(q, result, doubtful), *memory)
 
     def _answered(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray) -> BatchResult:
         """The result, its doubtful rows filled by the reference."""

@@ -97,7 +97,11 @@ def limit_postures(
     start: int,
     stop: int,
 ) -> bool:
-    """Put the results of postures start to stop within the limits; whether any is in doubt."""
+    """Put the results of postures start to stop within the limits.
+
+    Returns:
+        Whether any of them is in doubt, or has no answer.
+    """
     offset, limits = _offsets(offsets), _limit_offsets(limit_offsets)
     doubt, waiting = False, 0
     moving, gains = feet.held == 1, len(out.com_gain) > 0
@@ -149,7 +153,8 @@ def limit_postures(
                         some = True
                     elif pack.pressed[lane] < -1:
                         out.doubtful[row, criteria.column[index]] = 1
-                        doubt = True
+                    doubt = doubt or pack.pressed[lane] < -1
+                    doubt = doubt or found.state[row, criteria.column[index]] == IMPOSSIBLE
             if not some:
                 continue
             move_unknowns(feet, offset, limits, W, criteria, index)
@@ -174,7 +179,7 @@ def limit_postures(
                     row_margins(feet, rows, out, found.margins, p.slack, row, column)
                     if not good:
                         out.doubtful[row, column] = 1
-                        doubt = True
+                    doubt = doubt or not good or found.state[row, column] == UNLOADED
     return doubt
 
 
