@@ -1,9 +1,11 @@
 """The window: its doors, what a slider does through viser's protocol, and in a real browser."""
 
 import shlex
+import time
 from contextlib import contextmanager
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.browser import chromium, colour_at
 from support.commands import copsense as command
@@ -18,7 +20,7 @@ viser = pytest.importorskip("viser", reason="the extra explore is not installed"
 
 from support.viser_client import Client  # noqa: E402
 
-from copsense.explore.drawing import NAMED  # noqa: E402
+from copsense.explore.drawing import NAMED, support  # noqa: E402
 from copsense.explore.explorer import Explorer  # noqa: E402
 
 READY = (
@@ -75,6 +77,27 @@ def test_what_the_command_asked_for_stays_to_the_last_digit(stance_of):
         assert panel.read() == replace(
             state, length=0.1, limits=replace(state.limits, torque="model")
         )
+
+
+def test_from_above_the_soles_are_near_and_nothing_hides_them(explorer):
+    explorer._reset()
+    with Client(explorer) as client:
+        client.until("copsense analyse icub<")
+        explorer._from_above()
+        scene, (tab,) = explorer._scene, explorer.server.viser.get_clients().values()
+        middle, size = support(explorer.view)
+        client.until('id="copsense-revision"')
+        assert tab.camera.position[2] == pytest.approx(explorer.view.ground + size)
+        np.testing.assert_allclose(tab.camera.look_at, middle)
+        end = time.monotonic() + 10.0
+        while scene._com.visible and time.monotonic() < end:
+            time.sleep(0.02)
+        assert not scene._com.visible
+        assert not scene._bones.visible
+        assert not any(arrows.visible for arrows in scene._arrows.values())
+        assert all(ball.visible for balls in scene._balls.values() for ball in balls)
+    explorer._from_front()
+    explorer._reset()
 
 
 @pytest.fixture(scope="module")

@@ -50,7 +50,7 @@ class Shown:
 
     Attributes:
         robot: its meshes where it has some, the stick figure, or neither.
-        forces: arrows of the contact forces.
+        forces: arrows of the contact forces, beside a robot that is not hidden.
         torques: joints coloured by torque, of the criterion named; empty for none.
         regions: outlines of the regions of the CoM.
         axes: axes of the contact frames.
@@ -84,6 +84,16 @@ def look_at(view: View) -> tuple[np.ndarray, float]:
     return (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.2)
 
 
+def support(view: View) -> tuple[np.ndarray, float]:
+    """The middle of what is on the ground, soles and regions, and how large that is [m]."""
+    flat = [view.com[:2], *view.placements[:, :2], *(s[:, :2] for s in view.soles)]
+    flat += [region.corners for region in view.regions or ()]
+    points = np.vstack([np.reshape(each, (-1, 2)) for each in flat])
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = max(float(np.linalg.norm(high - low)), 0.1)
+    return np.array([*(low + high) / 2, view.ground]), size
+
+
 def place_camera(server: Any, view: View, distance: float = 1.0) -> None:
     """Have the robot in the picture when a browser connects; nearer with less distance."""
     middle, size = look_at(view)
@@ -96,7 +106,7 @@ def fit_camera(client: Any, view: View) -> None:
     if client.camera.image_width >= _NARROW:
         return
     middle, size = look_at(view)
-    away = 1.9 * size
+    away = 2.9 * size
     with client.atomic():
         client.camera.position = middle + away * np.array([0.8, -0.54, 0.27])
         client.camera.look_at = middle - np.array([0.0, 0.0, 0.5 * away])
@@ -173,6 +183,8 @@ class Scene:
             handle.visible = shown.axes
         ground = np.array([*view.com[:2], view.ground + _LIFT])
         self._com.position, self._shadow.position = view.com, ground
+        for handle in (self._com, self._plumb):
+            _assign(handle, visible=shown.robot != "hidden")
         self._plumb.points = np.array([[view.com, ground]])
         colours = criterion_colours([each.name for each in view.criteria])
         self._show_criteria(view, shown, colours)
@@ -291,7 +303,8 @@ class Scene:
             there = name in colours
             for ball in balls:
                 _assign(ball, visible=there)
-            _assign(self._arrows[name], visible=there and shown.forces)
+            seen = shown.forces and shown.robot != "hidden"  # from above they hide the dots
+            _assign(self._arrows[name], visible=there and seen)
         for each in view.criteria:
             for ball, cop in zip(self._balls[each.name], each.cop_world, strict=True):
                 ball.visible = bool(np.all(np.isfinite(cop)))

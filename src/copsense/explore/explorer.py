@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 from copsense.design import Objective
 from copsense.errors import CopsenseError
 from copsense.explore.best_weights import best_weights
-from copsense.explore.drawing import Scene, fit_camera, look_at, place_camera
+from copsense.explore.drawing import Scene, fit_camera, look_at, place_camera, support
 from copsense.explore.model import Model, Stale
 from copsense.explore.panel import Panel
 from copsense.explore.played_model import PlayedModel
@@ -281,24 +281,21 @@ class Explorer:
 
     def _from_above(self) -> None:
         self._panel.hide_robot(True)  # what counts is under it
-        self._move_cameras(np.array([-1e-3, 0.0, 1.0]), at_ground=True)
+        if self.view is not None:
+            middle, size = support(self.view)
+            self._move_cameras(middle, middle + size * np.array([-1e-3, 0.0, 1.0]))
 
     def _from_front(self) -> None:
         self._panel.hide_robot(False)
-        self._move_cameras(np.array([1.25, 0.0, 0.1]), at_ground=False)
+        if self.view is not None:
+            middle, size = look_at(self.view)
+            self._move_cameras(middle, middle + size * np.array([1.25, 0.0, 0.1]))
 
-    def _move_cameras(self, way: np.ndarray, *, at_ground: bool) -> None:
-        view = self.view
-        if view is None:
-            return
-        middle, size = look_at(view)
-        if at_ground:
-            middle[2] = view.ground
+    def _move_cameras(self, at: np.ndarray, where: np.ndarray) -> None:
         for client in self.server.viser.get_clients().values():
             with client.atomic():
                 client.camera.up_direction = (0.0, 0.0, 1.0)
-                client.camera.position = middle + size * way
-                client.camera.look_at = middle
+                client.camera.position, client.camera.look_at = where, at
 
 
 def _shape_of(model: Model, meshes: bool) -> tuple[Shape, list[str]]:
