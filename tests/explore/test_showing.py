@@ -5,12 +5,13 @@ import re
 
 import pytest
 from support.browser import chromium, colour_at, offline, scene_of
+from support.commands import copsense as command
 from support.results import small_log
 
 import copsense
 from copsense.controllers.target import Sine
 from copsense.errors import InvalidInputError, OutputError
-from copsense.explore import Model, show
+from copsense.explore import Model, ShownPage, show
 from copsense.explore.drawing import NAMED
 from copsense.logs import compare_log
 from copsense.posture_run import PostureRun
@@ -92,3 +93,15 @@ def test_what_cannot_be_shown_is_said(icub):
 
     with pytest.raises(InvalidInputError, match="a policy of the analysis"):
         copsense.analyse(icub, [policy]).show()
+
+
+def test_a_balanced_run_is_exported_with_the_criterion_that_was_applied(tmp_path):
+    path = tmp_path / "run.html"
+    run = ["balance", "icub", "--duration", "0.05s", "--criterion", "weighted-torque:hip=2"]
+    done = command(*run, "--export", path)
+    assert done.code == 0, done.err
+    assert f"written: {path}" in done.out
+    said = words(ShownPage(path.read_text(encoding="utf-8"), 0))
+    for name in ("weighted-torque:hip=2", "minimum-wrench", "minimum-torque"):
+        assert f"{name}, at rest" in said
+    assert "exists already" in command(*run, "--export", path).err

@@ -40,12 +40,16 @@ from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from copsense.criterion import Criterion
+    from copsense.limits import Limits
     from copsense.simulation import Recording
+    from copsense.stance import Stance
 
 
 @click.command(
     epilog="\b\nExamples:\n"
     "  copsense balance icub --reference sine:0.03:0.1 --output icub.nc --plot icub.png\n"
+    "  copsense balance icub --reference sine:20mm:0.5 --export icub.html\n"
     "  copsense balance icub --push 0:40:0:0.5:0.1 --gain com-stiffness=100 --gain com-damping=20\n"
     "  copsense balance icub --controller my_balance:Balance --video icub.mp4"
 )
@@ -93,6 +97,12 @@ if TYPE_CHECKING:
 @click.option("--output", type=click.Path(), help="Write the recording: .nc.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw it: .png, .svg or .pdf.")
 @click.option("--video", type=click.Path(), help="Film it, off-screen: .mp4.")
+@click.option(
+    "--export",
+    type=click.Path(),
+    help="Write it as a film in 3-D, measured centres of pressure beside those predicted at rest "
+    "and in motion, in one self-contained page: .html.",
+)
 @click.option("--force", is_flag=True, help="Overwrite the outputs.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def balance(
@@ -113,6 +123,7 @@ def balance(
     output: str | None,
     picture: str | None,
     video: str | None,
+    export: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -144,6 +155,11 @@ def balance(
 
         check_output(video, suffixes=(".mp4",), overwrite=force)
         check_video()
+    if export is not None:
+        from copsense.extras import require
+
+        check_output(export, suffixes=(".html",), overwrite=force)
+        require("viser", "a film in 3-D")
     course = read_signal(reference)
     scenario = Scenario(
         natural_duration(course) if duration is None else duration,
@@ -194,13 +210,34 @@ def balance(
 
         with progress_bar(None, "filming", "frame") as update:
             write_video(stance, recording, video, overwrite=force, progress=update)
+    if export is not None:
+        _export(recording, stance, criterion, allowed, export, force)
     if as_json:
         echo_json(recording.to_dict())
     else:
         _print(recording)
-        echo_written(output, picture, video)
+        echo_written(output, picture, video, export)
     codes = {"completed": 0, "stopped": 130}
     click.get_current_context().exit(codes.get(recording.end.kind, 1))
+
+
+def _export(
+    recording: Recording,
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits | None,
+    path: str,
+    force: bool,
+) -> None:
+    """Write the page, the criterion that was applied among those that it shows."""
+    from copsense.explore.export import frames_of
+    from copsense.explore.playback import recording_run
+    from copsense.explore.showing import paper_criteria_and, show
+
+    run, criteria = recording_run(recording, stance), paper_criteria_and(criterion)
+    with progress_bar(frames_of(run), "drawing", "frame") as update:
+        page = show(run, criteria=criteria, limits=limits, advance=update)
+    page.save(path, overwrite=force)
 
 
 @contextmanager

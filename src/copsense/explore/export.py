@@ -109,9 +109,10 @@ def played_views(
     return [found[row] for row in rows]
 
 
-def frames_of(model: Model, rate: float = RATE) -> int:
+def frames_of(model: Model | PostureRun, rate: float = RATE) -> int:
     """How many times `page_of` calls `advance` with 1."""
-    return 2 * len(frame_rows(model.run, rate)[0]) if isinstance(model, PlayedModel) else 2
+    run = model.run if isinstance(model, PlayedModel) else model
+    return 2 * len(frame_rows(run, rate)[0]) if isinstance(run, PostureRun) else 2
 
 
 def export_page(

@@ -10,7 +10,7 @@ from pathlib import Path
 from copsense.analysis import Analysis
 from copsense.arrays import check_type
 from copsense.content import ShortRepr
-from copsense.criterion import Criterion
+from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.errors import InvalidInputError
 from copsense.explore.export import RATE, page_of
 from copsense.explore.model import Model
@@ -103,6 +103,13 @@ def show(
     model = _model(subject, stance, criteria, limits)
     page = page_of(model, model.start, meshes=meshes, rate=rate, command="", advance=advance)
     return ShownPage(page, height)
+
+
+def paper_criteria_and(criterion: Criterion) -> list[Criterion]:
+    """The paper's two criteria, and another one first: the one that was applied, say."""
+    usual = [minimum_wrench(1.0), minimum_torque()]
+    others = [each for each in usual if each.name != criterion.name]
+    return usual if criterion in usual else [criterion, *others]
 
 
 def _model(
