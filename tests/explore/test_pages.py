@@ -56,6 +56,14 @@ def test_an_exported_page_draws_the_robot_and_requests_nothing(
         assert page.failed == []
 
 
+def test_an_exported_page_says_who_wrote_what_it_gives_on(exported):
+    text = exported.read_text(encoding="utf-8").partition("<summary>Licences of the 3-D view")[2]
+    for name in ("three 0.", "react 19.", "@mantine/core 9."):
+        assert f"\n{name}" in text
+    assert "Copyright" in text
+    assert "The above copyright notice and this permission notice shall be included" in text
+
+
 def test_an_exported_page_is_small_and_the_stick_figure_nobodys(exported):
     text = exported.read_text(encoding="utf-8")
     assert len(text) < 0.9e6

@@ -235,9 +235,15 @@ def _page(name: str, scene: str, body: Parts, code: str, licences: Sequence[str]
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{name}</title><style>{_STYLE}</style></head><body>"
         f"<h1>{name}</h1>{before}{frame}{after}{command}"
-        f"<footer>{made}<p>Made by copsense {__version__}; the 3-D view is by viser "
-        "(MIT licence).</p></footer></body></html>\n"
+        f"<footer>{made}<p>Made by copsense {__version__}; the 3-D view is by viser.</p>"
+        f"<details><summary>Licences of the 3-D view</summary><pre>{_text(_notices())}</pre>"
+        "</details></footer></body></html>\n"
     )
+
+
+def _notices() -> str:
+    """Who wrote what the client holds: the page gives it on, and it says nothing of that itself."""
+    return Path(__file__).with_name("notices.txt").read_text(encoding="utf-8")
 
 
 def _text(value: object) -> str:
