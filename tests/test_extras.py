@@ -59,6 +59,12 @@ def test_a_missing_extra_names_the_line_that_installs_it(package, code, tmp_path
     assert list(tmp_path.iterdir()) == []
 
 
+def test_figures_need_nothing_of_another_extra():
+    others = [package for package, extra in EXTRA_OF.items() if extra != "plots"]
+    done = run(FOUR_BAR + f"copsense.analyse(s, {CRITERIA}).plot()", *others)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_missing_extra_is_one_line_of_the_command(tmp_path):
     code = "from copsense.cli import main; sys.argv = {}; main()"
     picture = str(tmp_path / "x.png")

@@ -16,7 +16,8 @@ import click
 from copsense._version import __version__
 from copsense.cli.lazy_group import LazyGroup, Place
 from copsense.cli.printing import echo_notes
-from copsense.errors import CopsenseError
+from copsense.errors import CopsenseError, MissingExtraError
+from copsense.extras import EXTRA_OF
 
 _COMMANDS = {
     name: Place(f"copsense.cli.{name.replace('-', '_')}_command", function, summary)
@@ -95,8 +96,11 @@ def _run() -> int:
 
 
 def _unloadable(error: ImportError) -> str:
-    """What is missing when a package that copsense needs is there and cannot be loaded."""
-    remedy = "Install it again: pip install --force-reinstall copsense."
+    """What is missing when a package that copsense needs cannot be loaded."""
+    package = (error.name or "").partition(".")[0]
+    if isinstance(error, ModuleNotFoundError) and package in EXTRA_OF:
+        return str(MissingExtraError(package, EXTRA_OF[package], "this command"))
+    remedy = "Install it anew: pip install --force-reinstall copsense."
     if ".so" in str(error):
         # Pinocchio's wheels take OpenMP from the system, which slim containers leave out.
         remedy = "Install that library of the system (libgomp on Debian: apt install libgomp1)."

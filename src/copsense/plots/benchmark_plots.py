@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from copsense.comparison import CAVEAT, agreement, shown_unit
 from copsense.plots.style import (
     INK,
     MUTED,
@@ -24,6 +23,9 @@ from copsense.plots.style import (
     styled,
     whole_figure,
 )
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _ACROSS = 3  # panels in a row
 _BAR = 0.24  # inches that a bar takes
@@ -47,6 +49,8 @@ def plot_benchmark(
         label: what the legend says, before the controller's name where there are several.
         color: of the only controller, or controller -> color; default as in every figure.
     """
+    from copsense.comparison import CAVEAT, agreement
+
     look = looks(list(dict.fromkeys(table["controller"])), color, label, what="controllers")
     colour = look.colour
     found = agreement(table)
@@ -125,6 +129,8 @@ def _draw_agreement(
     ax: Axes, table: pd.DataFrame, found: pd.DataFrame, score: str, colour: dict[str, str]
 ) -> None:
     """Simulated over predicted; on the diagonal they are equal."""
+    from copsense.comparison import shown_unit
+
     rows = table[(table["score"] == score) & (table["status"] == "measured")]
     unit, factor = shown_unit(rows["unit"].iloc[0])
     for column, face in (("first_order", "none"), ("predicted", None)):
@@ -165,6 +171,8 @@ def _draw_bars(
     ax: Axes, trial: str, score: str, rows: pd.DataFrame, colour: dict[str, str], room: int
 ) -> None:
     """A bar per controller in each setting, its interval as a whisker, the prediction as a tick."""
+    from copsense.comparison import shown_unit
+
     unit, factor = shown_unit(rows["unit"].iloc[0])
     settings = [key for key, _ in rows.groupby(_SETTING, sort=False)]
     names = [name for name in colour if name in set(rows["controller"])]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from copsense.errors import InvalidInputError
-from copsense.maps.marginals import Marginal
 from copsense.plots.marking import say
 from copsense.plots.reading import MM
 from copsense.plots.robot_plots import draw_bones
@@ -29,6 +28,9 @@ from copsense.plots.style import (
     styled,
     whole_figure,
 )
+
+if TYPE_CHECKING:
+    from copsense.maps.marginals import Marginal
 
 # quantity -> (words, unit shown, factor)
 _SHOWN = {
