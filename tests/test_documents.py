@@ -88,3 +88,20 @@ def test_names_that_changed_lead_to_names_of_today():
         except (ImportError, AttributeError):
             missing.append(name)
     assert not missing
+
+
+def test_tables_of_the_paper_give_what_the_benchmarks_pages_give():
+    paper = (ROOT / "paper" / "paper.md").read_text("utf-8")
+    tables = re.findall(r"`python benchmarks/(\w+)\.py`:\n\n((?:\|.*\n)+)", paper)
+    assert len(tables) == 2
+    for name, table in tables:
+        page = (ROOT / "benchmarks" / f"{name}.md").read_text("utf-8")
+        known = set(re.findall(r"[\d.]*\d", page))
+        for number in re.findall(r"[\d.]*\d", table):
+            assert number in known, f"paper.md gives {number}, benchmarks/{name}.md does not"
+
+
+def test_the_paper_cites_what_its_bibliography_holds():
+    paper = (ROOT / "paper" / "paper.md").read_text("utf-8").partition("\n---\n")[2]
+    entries = re.findall(r"^@\w+\{(\w+),", (ROOT / "paper" / "paper.bib").read_text(), re.MULTILINE)
+    assert set(re.findall(r"@(\w+)", paper)) == set(entries)
