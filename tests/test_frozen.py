@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import copsense
+from copsense import rigid_body
 from copsense.limits import Limits
 
 
@@ -89,3 +90,18 @@ def test_threads_that_share_a_robot_do_not_share_working_memory(icub):
         found = list(pool.map(gradient, configurations))
     for q, given in zip(configurations, found, strict=True):
         np.testing.assert_array_equal(given, gradient(q))
+
+
+def test_what_a_robot_keeps_is_made_once(icub, monkeypatch):
+    """Names of 400 frames, and the memory that Pinocchio works in, are not made at each posture."""
+    criteria = (copsense.minimum_torque(), copsense.minimum_wrench(1.0))
+    for criterion in criteria:  # the first time they are
+        copsense.cop_sensitivity(icub, criterion)
+    robot = icub.robot
+    assert robot.frame_names is robot.frame_names
+    assert robot.torque_names is robot.torque_names
+    made = []
+    monkeypatch.setattr(rigid_body._Scratch, "__init__", lambda memory, of: made.append(of))
+    for criterion in criteria:
+        copsense.cop_sensitivity(icub.at(icub.q), criterion).com_travel  # noqa: B018
+    assert not made

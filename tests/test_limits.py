@@ -2,15 +2,15 @@
 
 import json
 import pickle
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError, fields, replace
 
 import numpy as np
 import pytest
 
 import copsense
 from copsense import solve_equilibrium
-from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.limits import NO_LIMITS, Limits, limit_rows
+from copsense.errors import CopsenseError, InvalidInputError, UnknownNameError
+from copsense.limits import LIMIT_NAMES, NO_LIMITS, Limits, limit_rows
 
 GIVEN = [
     Limits(),
@@ -117,3 +117,17 @@ def test_bad_limits_of_a_contact_name_it(given, said):
 def test_a_limit_of_an_unknown_contact_is_an_error(icub):
     with pytest.raises(UnknownNameError, match="l_sole"):
         limit_rows(icub, Limits(normal_force={"l_foot": 0.0}))
+
+
+def test_no_field_is_forgotten(icub):
+    """Whatever limits something counts as a limit, has a name in --limits and rejects nonsense."""
+    nothing = {each.name: None for each in fields(Limits) if each.name != "friction_sides"}
+    assert not Limits(**nothing).any
+    assert set(LIMIT_NAMES.values()) == {each.name for each in fields(Limits)}
+    for name in nothing:
+        limits = Limits(**nothing | {name: 1e-3})
+        assert limits.any, name
+        assert limit_rows(icub, limits).all_names, name
+        for wrong in (-1.0, float("nan"), True):
+            with pytest.raises(CopsenseError):
+                Limits(**nothing | {name: wrong})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cache, cached_property, lru_cache
 from typing import Any, Literal
@@ -24,14 +24,13 @@ from copsense.wrench_cone import unit_cone
 _ROUNDING = 1e-9  # m
 _CONE_VERTICES = 24  # a sole with more vertices is too fine for its exact wrench cone
 
-# Each limit as --limits names it -> its attribute of `Limits`.
-LIMIT_NAMES = {
-    "normal-force": "normal_force",
-    "friction": "friction",
-    "sides": "friction_sides",
-    "cop-margin": "cop_margin",
-    "torsion": "torsion",
-    "torque": "torque",
+_SHAPES = ("friction_sides",)  # fields of `Limits` that limit nothing themselves
+_FOR_EACH = ("normal_force", "friction", "cop_margin")  # those that may be a mapping of contacts
+# What a limit may be but a number.
+LIMIT_WORDS: dict[str, tuple[str, ...]] = {
+    "friction": ("contact",),
+    "torsion": ("contact", "cone"),
+    "torque": ("model",),
 }
 
 TorqueLimits = Literal["model"] | Mapping[str, float] | float
@@ -74,13 +73,13 @@ class Limits(ByContent):
             if isinstance(flag, bool | np.bool_):
                 raise InvalidInputError(f"a torque limit is {flag}. Give a number [Nm], or None.")
         object.__setattr__(self, "torque", own(self.torque))
-        for name in ("normal_force", "friction", "cop_margin", "torsion"):
+        for name in (each for each in _limiting() if each != "torque"):
             value = getattr(self, name)
             if isinstance(value, str):
-                allowed = {"friction": ("contact",), "torsion": ("contact", "cone")}.get(name, ())
+                allowed = LIMIT_WORDS.get(name, ())
                 if value not in allowed:
                     raise UnknownNameError(f"{name} limit", value, allowed)
-            elif isinstance(value, Mapping) and name != "torsion":
+            elif isinstance(value, Mapping) and name in _FOR_EACH:
                 each = {contact: _bound(name, bound, contact) for contact, bound in value.items()}
                 object.__setattr__(self, name, own(each))
             elif value is not None:
@@ -142,10 +141,19 @@ class Limits(ByContent):
     @property
     def any(self) -> bool:
         """Whether anything is limited."""
-        return any(
-            v is not None
-            for v in (self.normal_force, self.friction, self.cop_margin, self.torsion, self.torque)
-        )
+        return any(getattr(self, name) is not None for name in _limiting())
+
+
+def _limiting() -> Iterator[str]:
+    """The fields of `Limits` that limit something."""
+    return (each.name for each in fields(Limits) if each.name not in _SHAPES)
+
+
+# Each limit as --limits names it -> its attribute of `Limits`.
+LIMIT_NAMES = {
+    {"friction_sides": "sides"}.get(each.name, each.name.replace("_", "-")): each.name
+    for each in fields(Limits)
+}
 
 
 def _bound(name: str, value: object, contact: str = "") -> float:
@@ -300,7 +308,7 @@ def rows_of(
 ) -> LimitRows:
     """The same of contacts and joints' torque limits (n,) alone, forces stacked in their order."""
     known = [contact.name for contact in contacts]
-    for what in ("normal_force", "friction", "cop_margin"):
+    for what in _FOR_EACH:
         given = getattr(limits, what)
         for name in given if isinstance(given, Mapping) else ():
             if name not in known:

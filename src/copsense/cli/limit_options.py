@@ -14,16 +14,15 @@ from copsense.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from copsense.limits import Limits
 
-# What a number means; it may be written with its unit.
-_UNITS: dict[str, Unit] = {
-    "normal-force": "N",
+# What a number means where it is no force; it may be written with its unit.
+_UNITS: dict[str, Unit | None] = {
+    "friction": None,
     "cop-margin": "m",
     "torsion": "m",
     "torque": "Nm",
 }
-# Of each limit that can be switched off, what may be written.
+# What may be written, likewise.
 _EXAMPLES = {
-    "normal-force": "5, 5N",
     "friction": "0.33",
     "cop-margin": "0.005, 5mm",
     "torsion": "0.02, 20mm",
@@ -67,24 +66,22 @@ def read_limits(text: str | None) -> Limits | None:
 
 
 def _limit_value(name: str, value: str) -> float | int | str | None:
+    from copsense.limits import LIMIT_WORDS
+
     if value == "off" and name != "sides":
         return None
-    if value in {
-        "friction": ("contact",),
-        "torsion": ("contact", "cone"),
-        "torque": ("model",),
-    }.get(name, ()):
+    if value in LIMIT_WORDS.get(name, ()):
         return value
     try:
         if name == "sides":
             return int(value)
-        unit = _UNITS.get(name)
+        unit = _UNITS.get(name, "N")
         return float(value) if unit is None else read_quantity(value, unit)
     except ValueError:
         if name == "sides":
             remedy = "Write a whole number from 3, such as sides=8"
         else:
-            remedy = f"Write, say, {name}={_EXAMPLES[name]} or {name}=off"
+            remedy = f"Write, say, {name}={_EXAMPLES.get(name, '5, 5N')} or {name}=off"
         raise InvalidInputError(
             f"the limit {name}={value!r} is not understood. {remedy}."
         ) from None
