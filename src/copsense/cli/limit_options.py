@@ -14,7 +14,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 if TYPE_CHECKING:
     from copsense.limits import Limits
 
-# What a number means where it is no force; it may be written with its unit.
+# What a number means where it is not a force; it may be written with its unit.
 _UNITS: dict[str, Unit | None] = {
     "friction": None,
     "cop-margin": "m",
