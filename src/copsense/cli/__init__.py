@@ -100,7 +100,7 @@ def _unloadable(error: ImportError) -> str:
     package = (error.name or "").partition(".")[0]
     if isinstance(error, ModuleNotFoundError) and package in EXTRA_OF:
         return str(MissingExtraError(package, EXTRA_OF[package], "this command"))
-    remedy = "Install it anew: pip install --force-reinstall copsense."
+    remedy = "Install it again: pip install --force-reinstall copsense."
     if ".so" in str(error):
         # Pinocchio's wheels take OpenMP from the system, which slim containers leave out.
         remedy = "Install that library of the system (libgomp on Debian: apt install libgomp1)."
