@@ -18,6 +18,7 @@ from copsense.errors import (
     UnknownNameError,
 )
 from copsense.extras import require
+from copsense.joint_notes import swept_joint_notes
 from copsense.json_data import json_data
 from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits, check_limits
@@ -393,7 +394,8 @@ def sweep(
         dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
         if limits.any:
             dataset = with_limit_margins(dataset, limits)
-    return Sweep(dataset)
+    excess = dataset["joint_limit_excess"].values
+    return Sweep(dataset).with_notes(swept_joint_notes(path.stances[0].robot, excess))
 
 
 def _check_policies(

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from support.commands import copsense
 
-from copsense.analysis.joint_notes import distance_text
 from copsense.cli.sweep_command import _print
+from copsense.joint_notes import distance_text
 from copsense.pushes import _degrees
 
 LIMITS = "normal-force=10,friction=0.33333,torsion=0.01333,torque=model"

@@ -140,6 +140,7 @@ def test_a_sweep_of_a_prismatic_joint_is_in_metres(elevator):
     assert metres.json["unit"] == "m"
     assert metres.json["criteria"]["minimum-torque"]["planted"] == [0.0, 0.15]
     assert "slide is beyond its limit at 2 postures, by up to 100.0 mm" in metres.err
+    assert "slide is beyond its limit at 2 postures, by up to 100.0 mm" in metres.json["notes"]
     text = copsense("sweep", elevator, *STAND, "--joint", "slide=0mm:150mm:4").out
     assert "from +0 to +0.15 m" in text
 

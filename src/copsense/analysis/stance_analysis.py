@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.analysis.asked import asked_posture, determined_criteria
-from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
 from copsense.arrays import finite_number
@@ -19,6 +18,7 @@ from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
 from copsense.freedom import com_span, freedom_notes
+from copsense.joint_notes import joint_limit_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, optional_limits, torque_placeholders
 from copsense.path import LateralPath

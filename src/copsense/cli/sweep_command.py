@@ -19,9 +19,7 @@ from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.path import PosturePath
-    from copsense.robot import Robot
     from copsense.stance import Stance
-    from copsense.sweeps import Sweep
 
 
 @click.command(
@@ -107,7 +105,6 @@ def sweep(
     else:
         _print(answer)
         echo_written(output)
-    _note_joints(swept, path.stances[0].robot)
     for posture, criterion, reason in failures[:5]:
         click.echo(f"failed: posture {posture}, {criterion}: {reason}", err=True)
     if len(failures) > 5:
@@ -128,24 +125,6 @@ def _read_path(stance: Stance, course: Course, configurations: str | None) -> Po
     make, held = com_sweep if name in COM_COORDINATES else joint_sweep, course.held(stance.robot)
     with progress_bar(max(count, 0), "postures") as update:
         return make(stance, name, start, stop, count, held=held, progress=update)
-
-
-def _note_joints(swept: Sweep, robot: Robot) -> None:
-    """Say which joints are beyond their limits on the way."""
-    import numpy as np
-
-    from copsense.analysis.joint_notes import distance_text
-    from copsense.stance import AT_LIMIT
-
-    every = swept["joint_limit_excess"].values
-    for name, unit, excess in zip(robot.dof_names, robot.dof_units, every.T, strict=True):
-        count, most = int((excess > AT_LIMIT).sum()), float(np.nanmax(excess, initial=0.0))
-        if count:
-            click.echo(
-                f"note: {name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up "
-                f"to {distance_text(most, unit)}",
-                err=True,
-            )
 
 
 def _rounded(value: float) -> float:

@@ -9,7 +9,6 @@ from functools import lru_cache
 import numpy as np
 
 from copsense.analysis.asked import asked_posture, determined_criteria, placed_stance
-from copsense.analysis.joint_notes import joint_limit_notes
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
 from copsense.batch import PostureChart
@@ -28,6 +27,7 @@ from copsense.explore.view import (
     criterion_view,
     posture_parts,
 )
+from copsense.joint_notes import joint_limit_notes
 from copsense.limits import Limits
 from copsense.loads import Load
 from copsense.path import COM_COORDINATES, LateralPath

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from jaxtyping import Float
+
+from copsense.robot import Robot
 from copsense.stance import AT_LIMIT, Stance
 
 
@@ -17,6 +21,24 @@ def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
         )
         if excess > AT_LIMIT
     )
+
+
+def swept_joint_notes(robot: Robot, excess: Float[np.ndarray, "N n"]) -> tuple[str, ...]:
+    """The same of several postures: at how many of them, and by how much at most.
+
+    Args:
+        robot: whose joints they are.
+        excess: how far each is beyond its limit [rad, m]; NaN where there is no posture.
+    """
+    found = []
+    for name, unit, column in zip(robot.dof_names, robot.dof_units, excess.T, strict=True):
+        count, most = int((column > AT_LIMIT).sum()), float(np.nanmax(column, initial=0.0))
+        if count:
+            found.append(
+                f"{name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up to "
+                f"{distance_text(most, unit)}"
+            )
+    return tuple(found)
 
 
 def distance_text(value: float, unit: str) -> str:
