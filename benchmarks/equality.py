@@ -1,12 +1,17 @@
 """Does the kernel equal the reference? On 10 000 random postures, gradients included.
 
-    python benchmarks/equality.py [--count 10000] [--jobs 2]
+    python benchmarks/equality.py [--count 10000] [--jobs 2] [--limits]
 
 Postures are drawn with a `PostureChart` (CoM, orientation of the base, joints off the limbs) on
 two, three and four contacts of seven robots, on flat ground, slopes, tables and walls, within the
 joint limits. Every kind of criterion that the kernel serves is evaluated by both. Prints a Markdown
 table of the largest difference of a posture's quantity, relative to the largest entry of that
 quantity there; exits with 1 if one is over 1e-9.
+
+With `--limits` the same within limits that press on about half of the postures, on five robots:
+wrenches, derivatives and multipliers, both sides of the changes found between neighbours, every
+optimum's violation of its conditions, and for every posture a linear program that says whether it
+has any wrench within the limits.
 """
 
 import argparse
@@ -18,10 +23,14 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import linprog
 
 import copsense
+from copsense import Limits
 from copsense.batch import BatchKernel, PostureChart
 from copsense.batch.statics import batch_kernel
+from copsense.limits import limit_rows
+from copsense.load_problem import LoadProblem
 from copsense.posture import supporting_joints
 
 ALLOWED = 1e-9
@@ -83,20 +92,26 @@ def criteria_of(stance):
 
 def draw(stance, count, seed):
     """Random postures on the contacts, within the joint limits (count, nq)."""
+    return drawn(stance, count, seed)[2]
+
+
+def drawn(stance, count, seed):
+    """The same with the chart and its coordinates (count, nx)."""
     rng, mask = np.random.default_rng(seed), supporting_joints(stance)
     free = [j for j in stance.robot.joint_names if not mask[stance.robot.velocity_index(j)]]
     chart = PostureChart(stance, ["com_x", "com_y", "com_z", "roll", "pitch", "yaw", *free])
     size = np.array([LENGTH] * 3 + [TILT] * 3 + [TURN] * len(free))
-    found, tried = [], 0
+    found, values, tried = [], [], 0
     while sum(len(q) for q in found) < count:
         offset = size * rng.uniform(-1, 1, (4 * count, len(size)))
         offset[:, 2] -= LENGTH / 2  # lower, where the legs can follow
         batch = chart.solve(chart.values + offset)
         found.append(batch.configurations[batch.converged])
+        values.append((chart.values + offset)[batch.converged])
         tried += len(offset)
         if tried > 1000 * count:
             raise SystemExit(f"no postures of {stance.robot.name} found: {batch.reasons[0]}")
-    return np.vstack(found)[:count]
+    return chart, np.vstack(values)[:count], np.vstack(found)[:count]
 
 
 def largest_error(given, expected):
@@ -154,12 +169,177 @@ def compare(name, start, count):
     return name, len(stance.contacts), count, len(left), len(found.reasons), errors
 
 
+FIVE = ("icub, flat", "talos, slopes", "g1, slopes", "human, flat", "romeo, flat")
+LIMITED = (*WHAT[:-1], "multipliers", "one-sided")
+EXACT = 1e-9  # weights: relaxation, of rows of norm one, that is none
+FLOOR = 1e-3  # of a quantity's size: gains where limits hold a CoP are zero but for rounding
+
+
+def limits_of(stance, criteria):
+    """Limits that press on about half of the postures."""
+    own = BatchKernel(stance, criteria, gains=False).evaluate(draw(stance, 60, seed=99))
+    f = own.wrenches
+    slip = (np.hypot(f[..., 0], f[..., 1]) / np.abs(f[..., 2])).max(axis=-1)
+    peak = np.abs(own.torques).max(axis=-1)
+    return Limits(
+        friction=float(np.quantile(slip, 0.7)),
+        torque=float(np.quantile(peak, 0.7)),
+        torsion=0.03,
+        cop_margin=0.005,
+    )
+
+
+def changes(kernel, chart, values, result):
+    """Configurations at which a limit begins or ceases to press, between neighbouring postures.
+
+    By bisection along the straight line in the chart's coordinates, until a limit only touches.
+    """
+    sets = [[frozenset(p[p >= 0]) for p in row] for row in result.limits.pressing]
+    fine = (result.limits.state < 2).all(axis=1)
+    pairs = [
+        i
+        for i in range(0, len(values) - 1, 2)
+        if fine[i] and fine[i + 1] and sets[i][1] != sets[i + 1][1]
+    ]
+    low, high, found = values[pairs], values[[i + 1 for i in pairs]], {}
+    first = [sets[i][1] for i in pairs]
+    for _ in range(70):
+        middle = (low + high) / 2
+        batch = chart.solve(middle)
+        there = np.flatnonzero(batch.converged)
+        at = kernel.evaluate(batch.configurations[there])
+        same = np.zeros(len(pairs), dtype=bool)
+        for n, k in enumerate(there):
+            pressing = at.limits.pressing[n, 1]
+            same[k] = frozenset(pressing[pressing >= 0]) == first[k]
+            if at.limits.touching[n, 1] == 1 and at.limits.state[n, 1] < 2:
+                found.setdefault(int(k), batch.configurations[k])
+        low, high = np.where(same[:, None], middle, low), np.where(same[:, None], high, middle)
+    return np.array([*found.values()]).reshape(len(found), -1)
+
+
+def feasible(stance, q, limits):
+    """Whether a linear program finds wrenches within the limits."""
+    here = stance.at(q)
+    problem = LoadProblem.of(here)
+    A, b = limit_rows(here, limits).over_forces(problem)
+    unit, scale = stance.robot.weight, np.linalg.norm(A, axis=1)
+    scale[scale < 1e-12] = 1.0
+    # The least t by which all rows have to be relaxed: a program that always has an answer.
+    rows = np.column_stack([A / scale[:, None], -np.ones(len(b))])
+    balance = np.column_stack([problem.base_map, np.zeros(len(problem.base_wrench))])
+    bounds = [(-1e3, 1e3)] * A.shape[1] + [(0, None)]
+    cost, bound, load = np.eye(len(bounds))[-1], b / scale / unit, problem.base_wrench / unit
+    for method in ("highs", "highs-ds", "highs-ipm"):
+        found = linprog(cost, rows, bound, balance, load, bounds, method=method)
+        if found.status == 0:
+            return float(found.fun) <= EXACT
+    raise SystemExit(f"the linear program ended with status {found.status}: {found.message}")
+
+
+def compare_within(name, start, count):
+    """Of one case: what `compare` gives, within limits."""
+    stance = CASES[name]()
+    chart, values, q = drawn(stance, start + count, seed=list(CASES).index(name))
+    values, q = values[start:], q[start:]
+    criteria = criteria_of(stance)
+    limits = limits_of(stance, criteria)
+    kernel = BatchKernel(stance, criteria, limits)
+    found = kernel.evaluate(q)
+    turns = changes(kernel, chart, values, found)
+    q = np.vstack([q, turns])
+    found = kernel.evaluate(q)
+    sides = kernel.one_sided_gains(q, found)
+    errors = dict.fromkeys(LIMITED, 0.0)
+    counts = dict.fromkeys(("pressed", "infeasible", "touching", "wrong"), 0)
+    for i, j in np.ndindex(len(q), len(criteria)):
+        state = found.limits.states[found.limits.state[i, j]]
+        counts["pressed"] += state == "pressed"
+        counts["infeasible"] += state == "infeasible"
+        counts["touching"] += int(found.limits.touching[i, j] > 0)
+        if j == 0:
+            counts["wrong"] += (state != "infeasible") != feasible(stance, q[i], limits)
+        try:
+            expected = copsense.cop_sensitivity(stance.at(q[i]), criteria[j], limits)
+        except copsense.CopsenseError as error:
+            counts["wrong"] += found.reasons.get((i, j), "")[:60] != str(error)[:60]
+            continue
+        equilibrium = expected.equilibrium
+        pressing, multipliers = found.limits.pressing[i, j], np.zeros(len(found.limits.names))
+        multipliers[pressing[pressing >= 0]] = found.limits.multipliers[i, j][pressing >= 0]
+        motions = expected.com_motions.T
+        both = np.array(
+            [[expected.one_sided(m, side=side) for m in motions] for side in (-1, 1)]
+        )  # side, CoM x or y, contact, axis
+        pairs = {
+            "wrenches": (found.wrenches[i, j], equilibrium.wrenches),
+            "torques": (found.torques[i, j], equilibrium.torques),
+            "cops": (found.cops[i, j], expected.cop),
+            "gradient": (found.gradient[i, j], expected.gradient),
+            "com_gain": (found.com_gain[i, j], expected.com_gain),
+            "com_travel": (found.com_travel[i, j], expected.com_travel),
+            "multipliers": (multipliers, equilibrium.row_multipliers),
+            "one-sided": (sides[i, j].transpose(0, 3, 1, 2), both),
+        }
+        for what, (given, value) in pairs.items():
+            finite = np.isfinite(value)
+            size = max(float(np.abs(value[finite]).max(initial=0.0)), FLOOR)
+            same = np.array_equal(given[~finite], value[~finite])
+            gap = np.abs(given[finite] - value[finite]).max(initial=0.0) / size
+            errors[what] = max(errors[what], float(gap) if same else np.inf)
+        presses = pressing[pressing >= 0]
+        counts["wrong"] += set(presses.tolist()) != set(equilibrium.pressing.tolist())
+    optimality = float(np.nanmax(found.limits.optimality))
+    return name, len(q), len(turns), counts, optimality, errors
+
+
+def main_within(arguments):
+    """Compare five robots within limits in shares, and print the table."""
+    each = -(-arguments.count // len(FIVE))
+    shares = [(n, s, min(200, each - s)) for n in FIVE for s in range(0, each, 200)]
+    rows = {}
+    with ProcessPoolExecutor(arguments.jobs) as pool:
+        answers = pool.map(compare_within, *zip(*shares, strict=True))
+        for done, (name, postures, turns, counts, optimality, errors) in enumerate(answers, 1):
+            row = rows.setdefault(name, [0, 0, dict.fromkeys(counts, 0), 0.0, errors])
+            row[0], row[1], row[3] = row[0] + postures, row[1] + turns, max(row[3], optimality)
+            row[2] = {what: row[2][what] + counts[what] for what in counts}
+            row[4] = {what: max(row[4][what], errors[what]) for what in LIMITED}
+            print(f"\r{done}/{len(shares)} shares", end="", file=sys.stderr)
+    print(file=sys.stderr)
+    print("Within limits, largest relative difference of kernel and reference, four criteria a")
+    print("posture. *changes*: postures among them at which a limit only touches, found between")
+    print("neighbours; *pressed*, *infeasible*: answers; *wrong*: answers whose state differs from")
+    print("the reference's or a linear program's, or with other pressing limits; *optimality*: the")
+    print("largest violation of an optimality condition.\n")
+    head = [what.replace("_", " ") for what in LIMITED]
+    titles = "case | postures | changes | pressed | infeasible | wrong | optimality"
+    print(f"| {titles} | {' | '.join(head)} |")
+    print("|---" * (7 + len(LIMITED)) + "|")
+    for name, (postures, turns, counts, optimality, errors) in rows.items():
+        numbers = " | ".join(f"{errors[what]:.1e}" for what in LIMITED)
+        print(
+            f"| {name} | {postures} | {turns} | {counts['pressed']} | {counts['infeasible']} | "
+            f"{counts['wrong']} | {optimality:.1e} | {numbers} |"
+        )
+    worst = max(max(row[4].values()) for row in rows.values())
+    wrong = sum(row[2]["wrong"] for row in rows.values())
+    total = sum(row[0] for row in rows.values())
+    print(
+        f"\n{total} postures, {4 * total} answers, largest difference {worst:.1e}, {wrong} wrong."
+    )
+    return int(worst > ALLOWED or wrong > 0 or max(row[3] for row in rows.values()) > 1e-8)
+
+
 def main():
     """Compare every case in shares, and print the table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--count", type=int, default=10000, help="postures in all")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--limits", action="store_true", help="within limits, on five robots")
     arguments = parser.parse_args()
+    if arguments.limits:
+        return main_within(arguments)
     each = -(-arguments.count // len(CASES))
     shares = [(n, s, min(100, each - s)) for n in CASES for s in range(0, each, 100)]
     rows = {}

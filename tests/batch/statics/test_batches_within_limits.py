@@ -12,7 +12,7 @@ from support.stances import CASES, postures, served
 
 import copsense
 from copsense import Limits
-from copsense.batch import BatchKernel, evaluate_batch
+from copsense.batch import BatchKernel, PostureChart, evaluate_batch
 from copsense.batch.statics.batch_result import arrays_of
 from copsense.batch.statics.limit_result import limit_arrays
 from copsense.errors import InfeasibleError, UnloadedContactError
@@ -181,6 +181,38 @@ def test_results_without_limits_are_put_within_them(answers, case):
         kernel.limited(q[:2], free.evaluate(q))
     with pytest.raises(copsense.errors.InvalidInputError, match="the batch has no limits"):
         free.limited(q, free.evaluate(q))
+
+
+def test_both_sides_of_a_change_are_the_references(icub):
+    # Between two postures of other pressing limits, by bisection, to where one only touches.
+    limits = Limits(friction=0.5, cop_margin=0.02)
+    kernel = BatchKernel(icub, [copsense.minimum_torque()], limits)
+    chart = PostureChart(icub, ["com_y", "com_z"])
+    low, high = chart.values - [0.0, 0.03], chart.values + [0.04, -0.03]
+    for _ in range(60):
+        middle = (low + high) / 2
+        at = kernel.evaluate(chart.solve([middle]).configurations)
+        if at.limits.touching[0, 0]:
+            break
+        low, high = (middle, high) if at.limits.state[0, 0] == WITHIN else (low, middle)
+    assert at.limits.touching[0, 0] == 1
+    q = chart.solve([middle]).configurations
+    gains = kernel.one_sided_gains(q, at)
+    expected = copsense.cop_sensitivity(icub.at(q[0]), copsense.minimum_torque(), limits)
+    for n, side in enumerate((-1, 1)):
+        found = expected.one_sided(expected.com_motions[:, 1], side=side)
+        np.testing.assert_allclose(gains[0, 0, n, :, :, 1], found, rtol=0, atol=1e-9)
+        # The kernel says the same a little before and after.
+        near = chart.solve([middle + [side * 1e-6, 0.0]]).configurations
+        beside = kernel.evaluate(near)
+        assert beside.limits.touching[0, 0] == 0
+        np.testing.assert_array_equal(
+            kernel.one_sided_gains(near, beside)[0, 0, 0], beside.com_gain[0, 0]
+        )
+        np.testing.assert_allclose(beside.com_gain[0, 0, :, :, 1], found, rtol=0, atol=1e-4)
+    assert np.abs(gains[0, 0, 0] - gains[0, 0, 1]).max() > 0.1
+    with pytest.raises(copsense.errors.InvalidInputError, match="has no gains"):
+        kernel.one_sided_gains(np.vstack([q, q]), at)
 
 
 def test_a_hand_that_would_have_to_pull_is_left_without_load(icub):

@@ -21,11 +21,11 @@ from copsense.arrays import finite_array, whole_number
 from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.statics.batch_result import (
-    GAINS,
     BatchResult,
     arrays_of,
+    check_out,
+    clear_unanswered,
     empty_result,
-    nothing,
 )
 from copsense.batch.statics.compiled_kernel import CompiledKernel
 from copsense.batch.statics.compiled_limits import CompiledLimits
@@ -34,11 +34,9 @@ from copsense.batch.statics.kernel_limits import kernel_limits
 from copsense.batch.statics.limit_result import (
     LimitResult,
     empty_limits,
-    limit_arrays,
     limit_template,
 )
-from copsense.batch.statics.limit_states import IMPOSSIBLE, UNLOADED
-from copsense.batch.statics.reference import fill_row, sole_edges
+from copsense.batch.statics.reference import fill_row, sides, sole_edges
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
@@ -115,7 +113,7 @@ class BatchKernel:
             self._template = limit_template(stance, self.limits, len(names))
         self._single: _Single | None = None
         self._nq = int(stance.robot.model.nq)
-        self._expected = arrays_of(self.empty(0))
+        self._nothing = self.empty(0)
         self.fallback_reason = why_not_covered(stance)
         for criterion in self.criteria:
             if isinstance(criterion, Criterion):
@@ -173,7 +171,9 @@ class BatchKernel:
         """Evaluate every criterion at every configuration; see `evaluate_batch`."""
         q = self._checked(configurations)
         threads = whole_number(threads, "threads")
-        result = self.empty(len(q)) if out is None else self._fitting(out, len(q))
+        if out is not None:
+            check_out(out, self._nothing, len(q), gains=self.gains)
+        result = self.empty(len(q)) if out is None else out
         doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
         if not self.fallback_reason and len(q):
             self._fill(q, result, doubtful, threads)
@@ -217,6 +217,35 @@ class BatchKernel:
         doubtful[failed] = 0
         answered = self._answered(q, result, doubtful)
         return replace(answered, reasons={**answered.reasons, **own.reasons})
+
+    def one_sided_gains(
+        self, configurations: ArrayLike, result: BatchResult
+    ) -> Float[np.ndarray, "N nk 2 nc 2 2"]:
+        """d cop / d CoM just before and just after each posture, as CoM x or y rises.
+
+        Both are `BatchResult.com_gain`, but where a limit only touches: there the reference finds
+        each side, in milliseconds a row. NaN where no way was found on a side.
+
+        Args:
+            configurations: one in each row (N, nq).
+            result: of these, from `evaluate`, with gains.
+
+        Raises:
+            InvalidInputError: the result is of other postures or criteria, or without gains.
+        """
+        q = self._checked(configurations)
+        if result.criteria != self.names or len(result.com_gain) != len(q):
+            raise InvalidInputError(
+                f"{result!r} has no gains of the criteria {', '.join(self.names)} at {len(q)} "
+                "configurations. Evaluate these with gains=True first."
+            )
+        gains = np.repeat(result.com_gain[:, :, None], 2, axis=2)
+        if result.limits is None:
+            return gains
+        answered = ~np.isnan(result.cops).any(axis=(-1, -2))
+        for i, j in np.argwhere((result.limits.touching > 0) & answered):
+            gains[i, j] = sides(self.stance.at(q[i]), self.criteria[j], result.limits.limits)
+        return gains
 
     def one(self, q: np.ndarray) -> BatchResult:
         """Evaluate one configuration (nq,), for a controller's loop: no array is allocated.
@@ -282,23 +311,8 @@ class BatchKernel:
             if reason:
                 reasons[row, column] = reason
         if result.limits is not None:
-            reasons |= self._without_answer(result, result.limits, doubtful)
+            reasons |= clear_unanswered(result, result.limits, doubtful)
         return replace(result, reasons=reasons)
-
-    def _without_answer(
-        self, result: BatchResult, limits: LimitResult, doubtful: np.ndarray
-    ) -> dict[tuple[int, int], str]:
-        """Clear the rows that the limited kernel found to have no answer; why they have none."""
-        state, contacts = limits.state, self.stance.contact_names
-        without = ((state == IMPOSSIBLE) | (state == UNLOADED)) & (doubtful == 0)
-        if not without.any():
-            return {}
-        for name, array in arrays_of(result).items():
-            if name != "com" and len(array):
-                array[without] = nothing(name)
-        limits.margins[without & (state == IMPOSSIBLE)] = np.nan
-        rows = [(int(i), int(j)) for i, j in np.argwhere(without)]
-        return {(i, j): limits.reason(i, j, contacts) for i, j in rows}
 
     def _checked(self, configurations: ArrayLike) -> Float[np.ndarray, "N nq"]:
         robot, nq = self.stance.robot, self._nq
@@ -317,38 +331,6 @@ class BatchKernel:
                 except InvalidInputError as error:
                     raise InvalidInputError(f"row {row}: {error}") from None
         return q
-
-    def _fitting(self, out: BatchResult, count: int) -> BatchResult:
-        remedy = f"Make it with BatchKernel.empty({count})."
-        if not isinstance(out, BatchResult):
-            raise InvalidInputError(f"out is of type {type(out).__name__}. {remedy}")
-        for name, array in arrays_of(out).items():
-            wanted = self._expected[name]
-            first = 0 if name in GAINS and not self.gains else count
-            shape = (first, *wanted.shape[1:])
-            fits = array.shape == shape and array.dtype == wanted.dtype
-            if not (fits and array.flags.carray):
-                raise InvalidInputError(
-                    f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
-                    f"writeable; the batch needs {wanted.dtype} of shape {shape}. {remedy}"
-                )
-        if (out.limits is None) != (self.limits is None):
-            raise InvalidInputError(f"out is with limits, or the batch is, and not both. {remedy}")
-        if out.limits is not None and self._template is not None:
-            wanted_limits = limit_arrays(self._template)
-            for name, array in limit_arrays(out.limits).items():
-                wanted = wanted_limits[name]
-                fits = array.shape == (count, *wanted.shape[1:]) and array.dtype == wanted.dtype
-                if not (fits and array.flags.carray and out.limits.limits == self.limits):
-                    raise InvalidInputError(
-                        f"out.limits.{name} does not fit the limits of the batch. {remedy}"
-                    )
-        if out.criteria != self.names:
-            raise InvalidInputError(
-                f"out holds the criteria {', '.join(out.criteria)}, the batch "
-                f"{', '.join(self.names)}. {remedy}"
-            )
-        return out
 
 
 class _Single:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.batch.statics.limit_result import LimitResult
+from copsense.batch.statics.limit_result import LimitResult, limit_arrays
+from copsense.batch.statics.limit_states import IMPOSSIBLE, UNLOADED
 from copsense.content import freeze
+from copsense.errors import InvalidInputError
 from copsense.stance import Stance
 
 
@@ -118,3 +120,60 @@ def empty_result(
     }
     arrays: dict[str, Any] = {name: np.full(shape, nothing(name)) for name, shape in shapes.items()}
     return BatchResult(criteria, stance.contact_names, **arrays)
+
+
+def check_out(out: object, expected: BatchResult, count: int, *, gains: bool) -> None:
+    """Check that arrays can take the results of so many postures.
+
+    Args:
+        out: arrays to be filled.
+        expected: what they shall be like, of no posture.
+        count: of postures.
+        gains: whether gains are asked for.
+
+    Raises:
+        InvalidInputError: they cannot; the message says which, and why.
+    """
+    remedy = f"Make it with BatchKernel.empty({count})."
+    if not isinstance(out, BatchResult):
+        raise InvalidInputError(f"out is of type {type(out).__name__}. {remedy}")
+    for name, array in arrays_of(out).items():
+        wanted = getattr(expected, name)
+        shape = (count if gains or name not in GAINS else 0, *wanted.shape[1:])
+        fits = array.shape == shape and array.dtype == wanted.dtype
+        if not (fits and array.flags.carray):
+            raise InvalidInputError(
+                f"out.{name} is {array.dtype} of shape {array.shape}, or not contiguous and "
+                f"writeable; the batch needs {wanted.dtype} of shape {shape}. {remedy}"
+            )
+    if out.criteria != expected.criteria:
+        raise InvalidInputError(
+            f"out holds the criteria {', '.join(out.criteria)}, the batch "
+            f"{', '.join(expected.criteria)}. {remedy}"
+        )
+    if (out.limits is None) != (expected.limits is None):
+        raise InvalidInputError(f"out is with limits, or the batch is, and not both. {remedy}")
+    if out.limits is not None and expected.limits is not None:
+        for name, array in limit_arrays(out.limits).items():
+            wanted = getattr(expected.limits, name)
+            fits = array.shape == (count, *wanted.shape[1:]) and array.dtype == wanted.dtype
+            if not (fits and array.flags.carray and out.limits.limits == expected.limits.limits):
+                raise InvalidInputError(
+                    f"out.limits.{name} does not fit the limits of the batch. {remedy}"
+                )
+
+
+def clear_unanswered(
+    result: BatchResult, limits: LimitResult, doubtful: np.ndarray
+) -> dict[tuple[int, int], str]:
+    """Clear the rows that the limited kernel found to have no answer; why they have none."""
+    state, contacts = limits.state, result.contacts
+    without = ((state == IMPOSSIBLE) | (state == UNLOADED)) & (doubtful == 0)
+    if not without.any():
+        return {}
+    for name, array in arrays_of(result).items():
+        if name != "com" and len(array):
+            array[without] = nothing(name)
+    limits.margins[without & (state == IMPOSSIBLE)] = np.nan
+    rows = [(int(i), int(j)) for i, j in np.argwhere(without)]
+    return {(i, j): limits.reason(i, j, contacts) for i, j in rows}

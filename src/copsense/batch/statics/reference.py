@@ -5,12 +5,16 @@ It answers what the compiled kernel does not cover, and the kernel is tested aga
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
+from jaxtyping import Float
 
 from copsense.batch.statics.batch_result import BatchResult, array_names, nothing
 from copsense.batch.statics.limit_reference import solve_limited
 from copsense.criterion import Criterion
-from copsense.errors import CopsenseError
+from copsense.errors import CopsenseError, InvalidInputError
+from copsense.limits import Limits
 from copsense.sensitivity import cop_sensitivity, sensitivity_of
 from copsense.stance import Stance
 from copsense.statics import WrenchPolicy
@@ -59,6 +63,19 @@ def fill_row(
     for name, value in values.items():
         getattr(result, name)[row, column] = value
     return ""
+
+
+def sides(
+    stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits
+) -> Float[np.ndarray, "2 nc 2 2"]:
+    """d cop / d CoM before and after a posture, NaN where no way was found on a side."""
+    found = cop_sensitivity(stance, criterion, limits)
+    gains = np.full((2, *found.com_gain.shape), np.nan)
+    for n, side in enumerate((-1, 1)):
+        for axis, motion in enumerate(found.com_motions.T):
+            with suppress(InvalidInputError):
+                gains[n, :, :, axis] = found.one_sided(motion, side=side)
+    return gains
 
 
 def sole_edges(stance: Stance) -> list[np.ndarray]:
