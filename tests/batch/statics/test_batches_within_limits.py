@@ -188,7 +188,7 @@ def test_both_sides_of_a_change_are_the_references(icub):
     limits = Limits(friction=0.5, cop_margin=0.02)
     kernel = BatchKernel(icub, [copsense.minimum_torque()], limits)
     chart = PostureChart(icub, ["com_y", "com_z"])
-    low, high = chart.values - [0.0, 0.03], chart.values + [0.04, -0.03]
+    low, high = chart.values - [0.0, 0.03], np.add(chart.values, [0.04, -0.03])
     for _ in range(60):
         middle = (low + high) / 2
         at = kernel.evaluate(chart.solve([middle]).configurations)
@@ -203,7 +203,7 @@ def test_both_sides_of_a_change_are_the_references(icub):
         found = expected.one_sided(expected.com_motions[:, 1], side=side)
         np.testing.assert_allclose(gains[0, 0, n, :, :, 1], found, rtol=0, atol=1e-9)
         # The kernel says the same a little before and after.
-        near = chart.solve([middle + [side * 1e-6, 0.0]]).configurations
+        near = chart.solve([np.add(middle, [side * 1e-6, 0.0])]).configurations
         beside = kernel.evaluate(near)
         assert beside.limits.touching[0, 0] == 0
         np.testing.assert_array_equal(
