@@ -42,7 +42,7 @@ from copsense.simulation import Scenario
 CONTACTS = ("l_sole", "r_sole")
 ROWS = 24
 EDGE = 1500  # bytes at the head and the tail that are hit more often
-SLOW = 30.0  # s: what takes longer has not been rejected in time
+SLOW = 90.0  # s: what takes longer has not been rejected in time
 # Of all mutations; what is read in a process of its own takes a second.
 SHARES = {
     "log.csv": 0.17,

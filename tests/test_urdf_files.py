@@ -1,6 +1,7 @@
 """URDF as people have it: encodings, namespaces, xacro, inertials; and what its parser says."""
 
 import os
+import re
 
 import pytest
 from support.tiny import FEET, broken, urdf
@@ -28,9 +29,12 @@ def written(tmp_path, raw):
         (HEAD.format("utf-16") + urdf()).encode("utf-16"),
         (HEAD.format("iso-8859-1") + "<!-- Fuß -->" + urdf()).encode("latin-1"),
         urdf().replace("<robot ", '<robot xmlns="http://example.org/robot" ').encode(),
+        re.sub(r'"(-?[0-9][0-9. e-]*)"', r'" \1 \n"', urdf())
+        .replace('version=" 1.0 \n"', 'version="1.0"')
+        .encode(),
         urdf().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ').encode(),
     ],
-    ids=["bom", "crlf", "blank", "utf-16", "latin-1", "namespace", "xacro's name alone"],
+    ids=["bom", "crlf", "blank", "utf-16", "latin-1", "namespace", "spaces", "xacro's name alone"],
 )
 def test_the_same_robot_in_another_dress_is_the_same_robot(raw, tmp_path):
     path = written(tmp_path, raw)

@@ -12,7 +12,7 @@ from typing import Literal
 from copsense.errors import ModelLoadError
 from copsense.listing import first_few, listed
 from copsense.sdf import sdf_faults, sdf_notes
-from copsense.urdf import urdf_faults, urdf_notes, without_namespace, xacro_left
+from copsense.urdf import strip_numbers, urdf_faults, urdf_notes, without_namespace, xacro_left
 from copsense.written_base import take_out_base
 from copsense.xml_numbers import wrong_number
 
@@ -99,7 +99,7 @@ def load_description(
     check_package_dirs(package_dirs)
     name = str(path or "the text given")
     text, document = _parse(source if path is None else path, name, kind)
-    spaced = without_namespace(document)
+    changed = without_namespace(document)
     found = next((known for known, tag in _ROOTS.items() if tag == document.tag), None)
     if found is None or found != (language or found):
         starts = [
@@ -119,10 +119,11 @@ def load_description(
         )
     notes: tuple[str, ...] = ()
     if found == "urdf":
+        changed |= strip_numbers(document)
         notes = (*take_out_base(document), *urdf_notes(document))
     elif found == "sdf":
         notes = tuple(sdf_notes(document))
-    if spaced or notes:
+    if changed or notes:
         text = ET.tostring(document, encoding="unicode")
     return Description(text, found, tuple(map(str, package_dirs)), path, notes, tuple(frames), root)
 

@@ -11,6 +11,7 @@ from copsense.xml_numbers import read_numbers, wrong_number
 
 _JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _SHAPES = ("box", "cylinder", "sphere", "mesh")
+_NAMES = ("name", "link", "joint", "type", "filename")
 # How many numbers an attribute of an element holds.
 _NUMBERS = {
     "origin": {"xyz": 3, "rpy": 3},
@@ -35,6 +36,20 @@ def without_namespace(root: ET.Element) -> bool:
         if isinstance(element.tag, str):
             element.tag = element.tag.removeprefix(space + brace)
     return True
+
+
+def strip_numbers(root: ET.Element) -> bool:
+    """Take the white space off numbers, behind which the parser drops them; whether there was any.
+
+    It drops an ``<inertial>`` whose mass is ``"1.2 "``, and with it the mass.
+    """
+    found = False
+    for element in root.iter():
+        for key, value in element.items():
+            if value != value.strip() and key not in _NAMES and read_numbers(value):
+                element.set(key, value.strip())
+                found = True
+    return found
 
 
 def xacro_left(root: ET.Element) -> tuple[str, ...]:

@@ -28,7 +28,12 @@ def wrong_number(element: ET.Element, attribute: str, count: int, where: str) ->
 
 
 def read_numbers(text: str) -> list[float] | None:
-    """The finite numbers in a text, or None where it holds anything else."""
+    """The finite numbers in a text, or None where it holds anything else.
+
+    Also what Python takes for a number and no XML parser does: 1_0, digits of other scripts.
+    """
+    if "_" in text or not text.isascii():
+        return None
     try:
         numbers = [float(word) for word in text.split()]
     except ValueError:

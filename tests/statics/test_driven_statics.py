@@ -18,12 +18,15 @@ from copsense import (
     Load,
     PathScan,
     Robot,
+    Stance,
     TorqueTerm,
     WrenchTerm,
     analyse,
+    check_sensitivity,
     com_regions,
     cop_sensitivity,
     lateral_sweep,
+    load_stance,
     minimum_torque,
     minimum_wrench,
     solve_equilibrium,
@@ -37,6 +40,7 @@ from copsense.errors import (
     InvalidInputError,
     OpenLoopError,
     UnbalancedError,
+    UndeterminedWrenchError,
     UnknownNameError,
 )
 from copsense.loads import SpringLoad
@@ -370,3 +374,20 @@ stance = copsense.load_stance("icub")
     assert len(said) == len(WRONG_TYPES)
     for line, (call, word) in zip(said, WRONG_TYPES.items(), strict=True):
         assert word in line, f"{call}: {line}"
+
+
+def test_a_loop_between_limbs_with_motors_changes_no_wrench_that_weighs_wrenches_alone():
+    """The forces in it are between the motors; on the base its rows are rounding, and no lever."""
+    closed = load_stance("icub", drives=Drives(loops=(Loop("l_hand", "r_hand"),)))
+    opened = Stance(closed.robot.with_drives(Drives()), closed.q, closed.contacts)
+    criterion = minimum_wrench(1.0)
+    one, other = (solve_equilibrium(stance, criterion) for stance in (opened, closed))
+    weight = closed.robot.weight
+    assert other.residual() < 1e-9 * weight
+    np.testing.assert_allclose(other.wrenches, one.wrenches, rtol=0, atol=1e-9 * weight)
+    np.testing.assert_allclose(other.torques, one.torques, rtol=0, atol=1e-9 * weight)
+    check_sensitivity(closed, criterion)
+    with pytest.raises(UndeterminedWrenchError, match="forces in the loops undetermined"):
+        solve_equilibrium(closed, criterion, Limits(friction=0.5))
+    said = analyse(closed, limits=Limits(friction=0.5)).notes
+    assert any("minimum-wrench is left out" in note for note in said)

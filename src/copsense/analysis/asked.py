@@ -88,7 +88,8 @@ def determined_criteria(
             continue
         try:
             found[name] = tied = with_tie_break(stance, criterion)
-            if tied is not criterion and limits is not None:
+            loops = stance.closures is not None  # whose forces limits may leave free
+            if limits is not None and (tied is not criterion or loops):
                 solve_equilibrium(stance, tied, limits)  # or says why it cannot
         except UndeterminedWrenchError as error:
             del found[name]

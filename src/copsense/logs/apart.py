@@ -16,7 +16,8 @@ import numpy as np
 
 from copsense.errors import LogReadError
 
-_PATIENCE = 600.0  # s
+_PATIENCE = 60.0  # s, and
+_SLOWEST = 2e6  # bytes/s more: a damaged count makes a reader go on for minutes
 _LARGEST = 1_000_000_000  # bytes of a file that is read whole, several times over in memory
 
 
@@ -43,7 +44,11 @@ def read_apart(module: str, path: Path, what: str, instead: str) -> dict[str, np
     command = [sys.executable, "-P", str(program), str(path.absolute())]
     try:
         done = subprocess.run(
-            command, capture_output=True, env=environment, timeout=_PATIENCE, check=False
+            command,
+            capture_output=True,
+            env=environment,
+            timeout=_PATIENCE + size / _SLOWEST,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise LogReadError(f"{path} is damaged: reading it does not end. Copy it again.") from None

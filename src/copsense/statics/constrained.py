@@ -336,6 +336,15 @@ class _Problem:
             return None
         second = self.criterion.tie_break
         if second is None:
+            looped = (
+                self.stance.closures is not None and not self.criterion.at(self.stance).active.any()
+            )
+            if looped:
+                raise UndeterminedWrenchError(
+                    f"within limits, criterion {self.criterion.name!r} leaves the forces in the "
+                    "loops undetermined, which motors feel and it does not weigh. Give it a share "
+                    "of the torques: mixed((criterion, 1.0), (minimum_torque(), 1e-3))."
+                )
             raise UndeterminedWrenchError(
                 f"criterion {self.criterion.name!r} leaves wrenches undetermined. Give it a "
                 "tie_break such as minimum_wrench(1.0), or a small share of another criterion: "

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from copsense.statics.equilibrium import StaticEquilibrium
 
 _NULL = 1e-10  # singular values, relative, that count as lost
+_ROUNDING = 1e-12  # share of a row's largest entry
 
 
 class Kkt:
@@ -50,10 +51,16 @@ class Kkt:
         )
         self.size: int = int(self.on.sum())
         size = self.size
+        on = J if size == J.shape[1] else J[:, self.on]
+        if stance.closures is not None and size < J.shape[1]:
+            # A loop between two limbs with motors has rounding on the base, which scaling would
+            # take for a lever: what no row in K feels is nothing.
+            felt = np.abs(on).max(axis=1) > _ROUNDING * np.abs(J).max(axis=1)
+            on = on * felt[:, None]
         K = np.zeros((size + len(J), size + len(J)))
         if size > self.nb:
             K[self.nb : size, self.nb : size] = quadratic.compliance(self.problem)
-        K[size:, :size] = J if size == J.shape[1] else J[:, self.on]
+        K[size:, :size] = on
         K[:size, size:] = K[size:, :size].T
         K[size:, size:] = -quadratic.wrench
         self.system: SymmetricSystem = SymmetricSystem(K)
@@ -62,7 +69,7 @@ class Kkt:
         if self.system.singular:
             # Forces that no cost sees, F = null([J_on'; W_f]), stay free. The multipliers may be
             # free too (a massless foot), which changes neither forces nor torques.
-            _, s, vt = np.linalg.svd(np.vstack([J[:, self.on].T, quadratic.wrench]))
+            _, s, vt = np.linalg.svd(np.vstack([on.T, quadratic.wrench]))
             self.free = vt[int(np.sum(s > _NULL * s[0])) :].T
             # Forces of loops alone may be free: contacts and motors do not feel them.
             if np.abs(self.free[: len(stance.row_names)]).max(initial=0.0) < _NULL:
