@@ -1,19 +1,23 @@
 """Exported pages: they draw the robot in a real browser, light and dark, and request nothing."""
 
+import numpy as np
 import pytest
 from support.browser import chromium, colour_at, offline, scene_of
 from support.results import small_log
 
 from copsense.errors import InvalidInputError
 from copsense.explore import Model, Setting, State
-from copsense.explore.drawing import NAMED, ON_DARK, ON_LIGHT
+from copsense.explore.drawing import NAMED, ON_DARK, ON_LIGHT, look_at
 from copsense.explore.played_model import PlayedModel
+from copsense.explore.shape import load_shape
+from copsense.explore.view import placed, poses_of
 from copsense.logs.aligned_log import align_log
 from copsense.posture_run import PostureRun
 
 pytest.importorskip("viser", reason="the extra explore is not installed")
 
 from copsense.explore.export import export_page, frames_of, page_of
+from copsense.explore.film import film_html
 
 LEANING = State(("icub",), {"com_y": Setting(0.03, "m")})
 
@@ -99,3 +103,21 @@ def test_names_are_escaped(icub):
     text = page_of(PlayedModel(run), State(("icub",)))
     assert "<img onerror" not in text
     assert "&lt;img onerror=alert(1)&gt;{}" in text
+
+
+def test_a_place_of_a_view_is_that_of_its_frame(icub):
+    points = np.array([[0.1, -0.2, 0.3], [0.0, 0.0, 0.0]])
+    for pose, place in zip(poses_of(list(icub.placements)), icub.placements, strict=True):
+        found = placed(pose, points)
+        np.testing.assert_allclose(found, [place.act(p) for p in points], atol=1e-12)
+
+
+def test_meshes_are_in_the_picture_and_once_in_the_page(model, icub):
+    shape = load_shape(icub.robot)
+    view = model.view(LEANING)
+    (low, size), (high, larger) = look_at(view), look_at(view, shape)
+    assert larger > size  # the head is no joint
+    assert high[2] > low[2]
+    again = "dark.addEventListener"
+    assert again in film_html([view])
+    assert again not in film_html([view], shape=shape)

@@ -223,3 +223,13 @@ def test_a_robots_legend_is_in_its_figure(stance_of, name, side):
     assert min(inside.x0, inside.y0) >= 0
     assert inside.x1 <= whole.x1
     assert inside.y1 <= whole.y1
+
+
+def test_a_legend_leaves_a_title_to_be_read(swept):
+    figure = plots.plot_limit_margins(swept)
+    figure.draw_without_rendering()
+    ax = figure.axes[0]
+    title = next(t for t in ax.findobj(Text) if t.get_text() == ax.get_title("left"))
+    legend = ax.get_legend().get_window_extent()
+    assert legend.y0 >= title.get_window_extent().y1
+    assert legend.y1 <= figure.bbox.y1

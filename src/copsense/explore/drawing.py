@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from copsense.explore.shape import Shape
-from copsense.explore.view import CriterionView, View
+from copsense.explore.view import CriterionView, View, placed
 
 Colour = tuple[int, int, int]
 
@@ -77,9 +77,13 @@ def criterion_colours(names: Sequence[str]) -> dict[str, Colour]:
     return {name: NAMED.get(name) or next(rest) for name in names}
 
 
-def look_at(view: View) -> tuple[np.ndarray, float]:
-    """The middle of a robot, and how large it is [m]."""
+def look_at(view: View, shape: Shape | None = None) -> tuple[np.ndarray, float]:
+    """The middle of a robot, with its meshes where they are given, and how large it is [m]."""
     points = np.vstack([view.bones.reshape(-1, 3), view.placements[:, :3]])
+    for mesh in () if shape is None else shape.meshes:
+        ends = zip(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), strict=True)
+        corners = np.array(np.meshgrid(*ends)).reshape(3, -1).T
+        points = np.vstack([points, placed(view.poses[mesh.joint], corners)])
     low, high = points.min(axis=0), points.max(axis=0)
     return (low + high) / 2, max(float(np.linalg.norm(high - low)), 0.2)
 
@@ -94,9 +98,11 @@ def support(view: View) -> tuple[np.ndarray, float]:
     return np.array([*(low + high) / 2, view.ground]), size
 
 
-def place_camera(server: Any, view: View, distance: float = 1.0) -> None:
+def place_camera(
+    server: Any, view: View, distance: float = 1.0, shape: Shape | None = None
+) -> None:
     """Have the robot in the picture when a browser connects; nearer with less distance."""
-    middle, size = look_at(view)
+    middle, size = look_at(view, shape)
     server.initial_camera.look_at = middle
     server.initial_camera.position = middle + distance * size * np.array([1.05, -0.7, 0.3])
 

@@ -28,7 +28,8 @@ def film_html(
 ) -> str:
     """Views as a page of their own: a picture of one, of several a film with a bar to play it.
 
-    It is drawn for light and for dark pages, and shows itself as the browser asks for.
+    It is drawn for light and for dark pages, and shows itself as the browser asks for; with meshes,
+    which would be in it twice, for light ones alone.
 
     Args:
         views: of one model, at least one.
@@ -44,11 +45,12 @@ def film_html(
     """
     shape = shape or Shape()
     light = _recorded(views, seconds, shape, False, advance)
-    dark = _recorded(views, seconds, shape, True, lambda _: None)
-    page = str(light.as_html())
-    scene = base64.b64encode(dark.serialize()).decode("ascii")
+    page, more = str(light.as_html()), _QUIET
+    if not shape.meshes:
+        dark = _recorded(views, seconds, shape, True, lambda _: None)
+        more += _DARK.format(base64.b64encode(dark.serialize()).decode("ascii"))
     end = page.index("</head>")
-    return page[:end] + _QUIET + _DARK.format(scene) + page[end:]
+    return page[:end] + more + page[end:]
 
 
 def _recorded(  # type: ignore[no-untyped-def]  # viser's serializer
@@ -64,7 +66,7 @@ def _recorded(  # type: ignore[no-untyped-def]  # viser's serializer
         names = [each.name for each in views[0].criteria]
         shown = Shown(torques=names[-1] if names else "", opacity=OPACITY)
         scene.show(views[0], shown)
-        place_camera(server.viser, views[0], _NEAR)
+        place_camera(server.viser, views[0], _NEAR, shape)
         recording = server.viser.get_scene_serializer()
         for view in views if len(views) > 1 else ():
             scene.show(view, shown)

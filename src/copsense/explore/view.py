@@ -250,6 +250,12 @@ def poses_of(places: list[pin.SE3]) -> Float[np.ndarray, "j 7"]:
     return found[:, [0, 1, 2, 6, 3, 4, 5]]
 
 
+def placed(pose: Float[np.ndarray, " 7"], points: Float[np.ndarray, "k 3"]) -> np.ndarray:
+    """Points of a frame in the world (k, 3) [m]; the frame's pose is as `poses_of` has it."""
+    place = pin.XYZQUATToSE3(pose[[0, 1, 2, 4, 5, 6, 3]])
+    return np.asarray(place.translation + points @ place.rotation.T)
+
+
 def cops_in_world(stance: Stance, cops: Float[np.ndarray, "nc 2"]) -> Float[np.ndarray, "nc 3"]:
     """Centres of pressure in contact axes [m] as points of the world."""
     flat = np.column_stack([cops, np.zeros(len(cops))])

@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import is_color_like
 from matplotlib.figure import Figure as Figure  # for modules that do not import matplotlib
 from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation
 
 from copsense.errors import InvalidInputError
 from copsense.plots.saving import render_figure
@@ -43,6 +44,7 @@ _OTHERS = ("#009E73", "#E69F00", "#56B4E9", "#CC79A7", "#8C6D31", "#000000")
 _STYLES: tuple[Any, ...] = ("-", (0, (4.5, 1.8)), (0, (1.2, 1.4)), (0, (5, 1.4, 1.2, 1.4)))
 
 _NOTEBOOK_DPI = 90.0
+_TITLE = 17.0  # points that a title over the axes takes
 _LETTERS, _HANDLE = 15.0, 6  # letters per inch of a legend; letters that a handle takes
 
 _RC = {
@@ -285,10 +287,14 @@ def put_legend(ax: Axes, handles: Sequence[Artist]) -> None:
     width = ax.get_figure(root=True).get_figwidth() * ax.get_position().width  # type: ignore[union-attr]
     needed = sum(len(str(handle.get_label())) + _HANDLE for handle in handles)
     rows = math.ceil(needed / (_LETTERS * width))
+    titled = any(ax.get_title(loc) for loc in ("left", "center", "right"))
+    room = ScaledTranslation(0.0, _TITLE * titled / 72.0, whole_figure(ax).dpi_scale_trans)
+    above = ax.transAxes + room
     ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
+        bbox_transform=above,
         ncols=math.ceil(len(handles) / rows),
         borderaxespad=0.3,
         borderpad=0.0,
