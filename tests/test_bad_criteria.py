@@ -20,7 +20,7 @@ def on_wrenches(weights):
 def test_the_characteristic_length_is_a_positive_number_that_means_something(length):
     for build in (
         copsense.minimum_wrench,
-        lambda value: copsense.reference_wrench(np.zeros((2, 6)), value),
+        lambda value: copsense.criterion.reference_wrench(np.zeros((2, 6)), value),
         lambda value: copsense.criterion.criterion_named("minimum-wrench", value),
     ):
         with pytest.raises(InvalidInputError, match="characteristic length L"):
@@ -169,14 +169,14 @@ def test_extreme_weights_balance_or_say_so(icub, scale):
 @pytest.mark.parametrize("shape", [(1, 6), (2, 3), (12,), (3, 6)])
 def test_a_reference_of_the_wrong_shape_says_which_is_right(icub, shape):
     with pytest.raises(InvalidInputError, match=r"the reference of criterion .*\b6\)"):
-        copsense.solve_equilibrium(icub, copsense.reference_wrench(np.zeros(shape), 1.0))
+        copsense.solve_equilibrium(icub, copsense.criterion.reference_wrench(np.zeros(shape), 1.0))
 
 
 def test_a_reference_that_is_not_finite_says_where():
     reference = np.zeros((2, 6))
     reference[1, 2] = np.nan
     with pytest.raises(InvalidInputError, match="not finite at index 1, 2"):
-        copsense.reference_wrench(reference, 1.0)
+        copsense.criterion.reference_wrench(reference, 1.0)
 
 
 def zero(q):

@@ -113,7 +113,7 @@ def test_characteristic_length_weighs_moments_as_forces_at_that_arm(posture):
 def test_a_reference_that_already_balances_is_what_comes_out(posture):
     wanted = wrenches(posture, TORQUE)
     for L in (0.1, 1.0):
-        found = wrenches(posture, copsense.reference_wrench(wanted, L))
+        found = wrenches(posture, copsense.criterion.reference_wrench(wanted, L))
         np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
 
 

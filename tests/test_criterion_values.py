@@ -26,7 +26,7 @@ def every_kind():
         copsense.weighted_torque(np.arange(1.0, 24.0)),
         copsense.weighted_torque(matrix),
         copsense.weighted_torque("inverse inertia"),
-        copsense.reference_wrench(np.arange(12.0).reshape(2, 6), 0.5),
+        copsense.criterion.reference_wrench(np.arange(12.0).reshape(2, 6), 0.5),
         Criterion("by contact", (WrenchTerm({"l_sole": SIX, "r_sole": 2 * SIX}),)),
         copsense.mixed((wrench, 0.1), (torque, 1), tie_break=wrench, name="mix"),
     ]

@@ -147,7 +147,7 @@ def test_a_contact_that_would_have_to_pull_is_named(icub):
     # The reference pulls at the right foot; a criterion without limits gives it what it asks for.
     wanted = np.zeros((2, 6))
     wanted[:, 2] = np.array([1.2, -0.2]) * icub.robot.weight
-    pulled = copsense.reference_wrench(wanted, 1e-3)
+    pulled = copsense.criterion.reference_wrench(wanted, 1e-3)
     path = copsense.lateral_sweep(icub, 0, 0.12, 2)
     swept = copsense.sweep(path, [TORQUE, pulled])
     for i, stance in enumerate(path.stances):

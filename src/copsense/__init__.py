@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         minimum_torque,
         minimum_wrench,
         mixed,
-        reference_wrench,
         weighted_torque,
     )
     from copsense.design import design_criterion
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from copsense.limits import Limits
     from copsense.loads import Load
     from copsense.maps import load_map, map_postures
+    from copsense.optimisation import optimise
     from copsense.path import PosturePath, joint_sweep, lateral_sweep, path_through
     from copsense.posture import solve_posture
     from copsense.regions import com_regions
@@ -79,9 +79,9 @@ __all__ = [
     "minimum_torque",
     "minimum_wrench",
     "mixed",
+    "optimise",
     "path_through",
     "rectangle",
-    "reference_wrench",
     "solve_equilibrium",
     "solve_posture",
     "sweep",
@@ -107,7 +107,6 @@ _HOMES = {
         "minimum_torque",
         "minimum_wrench",
         "mixed",
-        "reference_wrench",
         "weighted_torque",
     ),
     "copsense.design": ("design_criterion",),
@@ -119,6 +118,7 @@ _HOMES = {
         "load_map",
         "map_postures",
     ),
+    "copsense.optimisation": ("optimise",),
     "copsense.path": (
         "PosturePath",
         "joint_sweep",

@@ -272,33 +272,49 @@ def lateral_posture(
         y: world y of the CoM [m].
         near: where to start the search; default `stance`.
     """
-    return _lateral(stance)(y, near or stance)
+    return _level(stance, "com_y")(y, near or stance)
+
+
+def level_posture(
+    stance: Stance, coordinate: str, value: float
+) -> tuple[Stance, Float[np.ndarray, " nv"]]:
+    """The same of a stance's path along either level axis of the CoM, the other one held.
+
+    Args:
+        stance: the posture that the path stays nearest to.
+        coordinate: ``"com_x"`` or ``"com_y"``.
+        value: of it, in the world [m].
+    """
+    return _level(stance, coordinate)(value, stance)
 
 
 class LateralPath:
-    """The lateral path of a stance for a search: CoM y to either side, CoM x held.
+    """The lateral path of a stance for a search: CoM y to either side, CoM x held; or forwards.
 
     A posture is solved when it is asked for, and kept: analyses that share the path share them.
 
     Attributes:
         stance: the posture that every other stays nearest to, in the middle of the path.
-        coordinate: ``"com_y"``.
-        values: world y of the CoM where a search looks first (2 * samples + 1,), rising [m].
+        coordinate: ``"com_y"``, or ``"com_x"`` of a path forwards and back, CoM y held.
+        values: of it where a search looks first (2 * samples + 1,), rising [m].
     """
 
-    coordinate = "com_y"
     continuous = True
 
-    def __init__(self, stance: Stance, reach: float = 0.15, samples: int = 15) -> None:
+    def __init__(
+        self, stance: Stance, reach: float = 0.15, samples: int = 15, *, coordinate: str = "com_y"
+    ) -> None:
         """Lay out where to look; nothing is solved yet.
 
         Args:
             stance: where the path begins.
             reach: how far the path goes to either side [m].
             samples: postures to either side that a search looks at first.
+            coordinate: along which level axis.
 
         Raises:
             InvalidInputError: no length, or no posture.
+            UnknownNameError: another coordinate.
         """
         check_stance(stance)
         check_at_rest(stance, "a path of postures")
@@ -307,16 +323,18 @@ class LateralPath:
         samples = whole_number(samples, "the samples of a search")
         self.stance = stance
         steps = np.linspace(-reach, reach, 2 * samples + 1)
-        self.values: Float[np.ndarray, " p"] = read_only(float(stance.com[1]) + steps)
-        self._solver = _lateral(stance)
+        self._solver = _level(stance, coordinate)
+        self.coordinate: str = coordinate
+        middle = float(stance.com[COM_COORDINATES.index(coordinate)])
+        self.values: Float[np.ndarray, " p"] = read_only(middle + steps)
         self._found: dict[float, tuple[Stance, np.ndarray] | str] = {}
 
     def __repr__(self) -> str:
         """Robot, range, and how many postures are solved so far."""
         low, high = self.values[0], self.values[-1]
         return (
-            f"LateralPath({self.stance.robot.name!r}, com_y from {low:.4g} to {high:.4g} m, "
-            f"{len(self._found)} postures solved so far)"
+            f"LateralPath({self.stance.robot.name!r}, {self.coordinate} from {low:.4g} to "
+            f"{high:.4g} m, {len(self._found)} postures solved so far)"
         )
 
     def __len__(self) -> int:
@@ -324,7 +342,7 @@ class LateralPath:
         return len(self.values)
 
     def at(self, value: float) -> tuple[Stance, Float[np.ndarray, " nv"]]:
-        """The stance and the tangent at a world y of the CoM [m].
+        """The stance and the tangent at a value of the coordinate [m].
 
         Raises:
             UnreachablePostureError: no posture was found there.
@@ -517,11 +535,15 @@ class _Along:
         return found.stance, found.tangents[:, columns.index(self.coordinate)]
 
 
-def _lateral(stance: Stance) -> _Along:
-    """Postures of a lateral path: CoM x held where the stance has it."""
+def _level(stance: Stance, coordinate: str) -> _Along:
+    """Postures of a level path: the other level coordinate held where the stance has it."""
+    if coordinate not in COM_COORDINATES[:2]:
+        raise UnknownNameError("level coordinate of the CoM", coordinate, COM_COORDINATES[:2])
+    other = COM_COORDINATES[1 - COM_COORDINATES.index(coordinate)]
     # A planar robot has no x to hold.
-    held = {"com_x": float(stance.com[0])} if stance.robot.base_nv == 6 else {}
-    return _Along(stance, "com_y", held, None)
+    level = stance.robot.base_nv == 6
+    held = {other: float(stance.com[COM_COORDINATES.index(other)])} if level else {}
+    return _Along(stance, coordinate, held, None)
 
 
 @dataclass(frozen=True, eq=False)

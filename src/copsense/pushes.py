@@ -229,20 +229,14 @@ def push_limits(
     frame = robot.base_frame if frame is None else frame
     within = Limits() if limits is None else limits
     rows, problem = limit_rows(stance, within), LoadProblem.of(stance)
-    # What a newton along world x and y takes off the balance.
-    unit = [
-        apply_loads([Load(frame, tuple(e), point=point)], robot, stance.q) for e in np.eye(3)[:2]
-    ]
-    taken = robot.by_drive(np.column_stack([each.balanced for each in unit]))
-    nb = len(problem.base_wrench)
-    slope, torque_slope = -taken[:nb], -taken[nb:]
+    slope, torque_slope, where = _taken(stance, frame, point)
     own = tuple(
         _criterion_pushes(stance, criterion, rows, problem, slope, torque_slope)
         for criterion in chosen.values()
     )
     best = _any_pushes(robot.weight, rows, problem, slope, torque_slope)
     notes = (*robot.notes, *tied)
-    return Pushes(stance, frame, read_only(unit[0].points[0].copy()), within, best, own, notes)
+    return Pushes(stance, frame, read_only(where.copy()), within, best, own, notes)
 
 
 def _any_pushes(
@@ -259,15 +253,51 @@ def _any_pushes(
     return PushRegion(ANY, polygon, ("",) * len(polygon))
 
 
-def _criterion_pushes(
+def push_planes(
+    stance: Stance,
+    criterion: Criterion,
+    limits: Limits,
+    frame: str,
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> tuple[Float[np.ndarray, "r 2"], Float[np.ndarray, " r"]]:
+    """The half-planes n . F <= b of slow horizontal pushes F that a criterion's wrenches answer.
+
+    Args:
+        stance: robot, posture and contacts.
+        criterion: what shares the load.
+        limits: what must be respected.
+        frame: name of the frame that is pushed.
+        point: where in the frame [m].
+
+    Returns:
+        n (r, 2) and b (r,) [N], in the rows of `limit_rows`; n is zero where no push matters.
+    """
+    rows, problem = limit_rows(stance, limits), LoadProblem.of(stance)
+    slope, torque_slope, _ = _taken(stance, frame, point)
+    return _planes(stance, criterion, rows, problem, slope, torque_slope)
+
+
+def _taken(
+    stance: Stance, frame: str, point: tuple[float, float, float]
+) -> tuple[Float[np.ndarray, "nb 2"], Float[np.ndarray, "n 2"], Float[np.ndarray, " 3"]]:
+    """What a newton along world x and y takes off the balance, and where it acts [m]."""
+    robot = stance.robot
+    unit = [
+        apply_loads([Load(frame, tuple(e), point=point)], robot, stance.q) for e in np.eye(3)[:2]
+    ]
+    taken = robot.by_drive(np.column_stack([each.balanced for each in unit]))
+    nb = robot.unactuated_nv
+    return -taken[:nb], -taken[nb:], unit[0].points[0]
+
+
+def _planes(
     stance: Stance,
     criterion: Criterion,
     rows: LimitRows,
     problem: LoadProblem,
     slope: Float[np.ndarray, "nb 2"],
     torque_slope: Float[np.ndarray, "n 2"],
-) -> PushRegion:
-    """What a criterion's own wrenches answer: an intersection of half-planes."""
+) -> tuple[Float[np.ndarray, "r 2"], Float[np.ndarray, " r"]]:
     weight = stance.robot.weight
 
     def share(push: Float[np.ndarray, " 2"]) -> np.ndarray:
@@ -290,7 +320,23 @@ def _criterion_pushes(
     if len(joint):
         normals[len(A) - len(joint) :] += rows.sign[:, None] * torque_slope[joint]
     size = np.linalg.norm(normals, axis=1)
-    still = size <= _STILL * np.maximum(np.linalg.norm(A, axis=1), 1.0)
+    normals[size <= _STILL * np.maximum(np.linalg.norm(A, axis=1), 1.0)] = 0.0
+    return normals, offsets
+
+
+def _criterion_pushes(
+    stance: Stance,
+    criterion: Criterion,
+    rows: LimitRows,
+    problem: LoadProblem,
+    slope: Float[np.ndarray, "nb 2"],
+    torque_slope: Float[np.ndarray, "n 2"],
+) -> PushRegion:
+    """What a criterion's own wrenches answer: an intersection of half-planes."""
+    weight = stance.robot.weight
+    normals, offsets = _planes(stance, criterion, rows, problem, slope, torque_slope)
+    size = np.linalg.norm(normals, axis=1)
+    still = size == 0
     corners = LARGEST * weight * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     if np.any(offsets[still] < -_STILL * weight):
         corners = corners[:0]

@@ -13,7 +13,7 @@ import pytest
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
     "robots", "inspect", "analyse", "explore", "sweep", "plot", "map", "push", "design",
-    "balance", "log", "identify", "benchmark", "four-bar", "reproduce",
+    "optimise", "balance", "log", "identify", "benchmark", "four-bar", "reproduce",
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",

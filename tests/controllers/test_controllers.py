@@ -109,7 +109,9 @@ def test_a_stiff_ankle_controller_is_no_criterion_and_still_balances(posture):
         share = (here.com[1] - right) / (left - right)
         wanted = np.zeros((2, 6))
         wanted[:, 2] = here.robot.weight * np.array([share, 1 - share])
-        return copsense.solve_equilibrium(here, copsense.reference_wrench(wanted, 1e-3)).wrenches
+        return copsense.solve_equilibrium(
+            here, copsense.criterion.reference_wrench(wanted, 1e-3)
+        ).wrenches
 
     found = copsense.cop_sensitivity(posture, controller)
     # All of the CoM's sideways travel goes into the loads: the CoPs hardly move.

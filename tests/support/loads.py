@@ -49,10 +49,10 @@ def criteria(stance):
             "by contact",
             (copsense.WrenchTerm({feet[0]: [1, 1, 1, 9, 9, 9], feet[1]: [3, 2, 1, 20, 10, 30]}),),
         ),
-        "reference wrench": copsense.reference_wrench(wanted, 0.5),
+        "reference wrench": copsense.criterion.reference_wrench(wanted, 0.5),
         "mixed": copsense.mixed((wrench, 1e-2), (torque, 1.0)),
         "mixed with a reference": copsense.mixed(
-            (copsense.reference_wrench(wanted, 0.3), 0.5), (inertia, 0.1), (wrench, 0.02)
+            (copsense.criterion.reference_wrench(wanted, 0.3), 0.5), (inertia, 0.1), (wrench, 0.02)
         ),
     }
     return {name: criterion.named(name) for name, criterion in cases.items()}

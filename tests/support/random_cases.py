@@ -95,7 +95,7 @@ def random_case(stance, rng):
         criterion = copsense.Criterion("full wrench", (copsense.WrenchTerm(F),))
     else:
         wanted = 0.3 * stance.robot.weight * rng.standard_normal((len(stance.contacts), 6))
-        criterion, F = copsense.reference_wrench(wanted, length), norm
+        criterion, F = copsense.criterion.reference_wrench(wanted, length), norm
         reference = stance.stack(wanted)
     limits = random_limits(stance, criterion, rng)
     return Case(stance, criterion.named(str(kind)), limits, W, F, reference)

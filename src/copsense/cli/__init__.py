@@ -31,6 +31,7 @@ _COMMANDS = {
         ("map", "map_command", "Map the sensitivity over a whole space of postures."),
         ("push", "push", "Push a robot that stands: how hard, from where, and what yields first."),
         ("design", "design", "Design the weights of a criterion that goes farther."),
+        ("optimise", "optimise", "Optimise the posture: travel, margins, pushes, gain or torques."),
         ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
         ("log", "log", "Compare a robot's own log with what every criterion says."),
         ("identify", "identify", "Identify which criterion explains a robot's own log."),

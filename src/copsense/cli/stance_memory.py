@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
+    from copsense.criterion import Criterion
     from copsense.robots import StanceFile
     from copsense.stance import Stance
 
@@ -38,24 +39,33 @@ def written(
     source: str | Path,
     overwrite: bool,
     package_dirs: Iterable[str | Path] = (),
+    criteria: Sequence[Criterion] | None = None,
 ) -> Stance:
-    """The stance, written to a file if one is asked for, with the command's limits and criteria."""
+    """The stance, written to a file if one is asked for, with the command's limits and criteria.
+
+    Args:
+        stance: what to write.
+        path: of the file; None for none.
+        source: the robot's file, or a preset's name.
+        overwrite: replace a file that is there.
+        package_dirs: folders of the robot's meshes.
+        criteria: instead of those that the command's options name.
+    """
     if path is not None:
         from copsense.cli.criterion_options import read_criteria
         from copsense.cli.limit_options import read_limits
         from copsense.robots import save_stance
 
         given: dict[str, Any] = click.get_current_context().params
-        criteria = ()
-        if "criteria" in given:
-            criteria = read_criteria(given["criteria"], given["characteristic_length"])  # type: ignore[assignment]
+        if criteria is None and "criteria" in given:
+            criteria = read_criteria(given["criteria"], given["characteristic_length"])
         save_stance(
             stance,
             path,
             robot=source,
             package_dirs=package_dirs,
             limits=read_limits(given.get("limits")),
-            criteria=criteria,
+            criteria=criteria or (),
             overwrite=overwrite,
         )
         click.echo(f"written: {path}", err=True)

@@ -27,6 +27,7 @@ from copsense.plots.design_plots import plot_design
 from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_regions
 from copsense.plots.log_plots import plot_log
 from copsense.plots.map_plots import plot_map
+from copsense.plots.optimum_plots import plot_front, plot_optimum
 from copsense.plots.push_plots import plot_pushes
 from copsense.plots.recording_plots import plot_rollout
 from copsense.plots.robot_plots import plot_robot
@@ -41,12 +42,14 @@ __all__ = [
     "plot_cop",
     "plot_design",
     "plot_foot_cop",
+    "plot_front",
     "plot_limit_margins",
     "plot_limited",
     "plot_load",
     "plot_log",
     "plot_map",
     "plot_margin",
+    "plot_optimum",
     "plot_pushes",
     "plot_regions",
     "plot_results",

@@ -49,7 +49,7 @@ def test_other_criteria_are_answered_by_the_reference(case):
         TORQUE,
         copsense.weighted_torque("inverse inertia", name="inertia"),
         copsense.minimum_tangential(TORQUE),
-        copsense.reference_wrench(np.tile([0, 0, 150.0, 0, 0, 0], (2, 1)), 0.5),
+        copsense.criterion.reference_wrench(np.tile([0, 0, 150.0, 0, 0, 0], (2, 1)), 0.5),
         policy,
     ]
     kernel = BatchKernel(stance, criteria)

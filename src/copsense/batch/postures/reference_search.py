@@ -66,10 +66,10 @@ def search_one(stance: Stance, plan: Coordinates, values: np.ndarray) -> Attempt
     while True:
         if not np.isfinite(given[: model.nv]).all():  # values so large that their squares overflow
             return Attempt(q, worst, steps, STUCK, which, 0.0)
-        q = _moved(stance, plan, q, placed, given[: model.nv])
+        q = moved_configuration(stance, plan, q, placed, given[: model.nv])
         placed = given[: model.nv].copy()
         here = stance.at(q, check=False)
-        h, opposite = _errors(here, plan, given)
+        h, opposite = constraint_errors(here, plan, given)
         if folds and not np.isfinite(here.jacobian).all():
             return Attempt(q, worst, steps, STUCK, which, 0.0)
         fold = here.fold_equations if folds else None
@@ -131,10 +131,18 @@ def within_limits(here: Stance, plan: Coordinates) -> tuple[int, int, float]:
     return (BEYOND if excess > AT_LIMIT else SOLVED), which, excess
 
 
-def _moved(
+def moved_configuration(
     stance: Stance, plan: Coordinates, q: np.ndarray, before: np.ndarray, given: np.ndarray
 ) -> np.ndarray:
-    """The configuration of base coordinates and joint positions, the latter from where they are."""
+    """The configuration of base coordinates and joint positions, the latter from where they are.
+
+    Args:
+        stance: that of the plan.
+        plan: what the given numbers mean.
+        q: a configuration (nq,).
+        before: its given numbers (nv,).
+        given: those to move it to (nv,).
+    """
     model, nb = stance.robot.model, stance.robot.base_nv
     way = given - before
     way[:nb] = 0.0
@@ -166,7 +174,9 @@ def contact_target(plan: Coordinates, k: int, wanted: np.ndarray) -> tuple[np.nd
     return position, plan.rotations[k] @ turn
 
 
-def _errors(here: Stance, plan: Coordinates, given: np.ndarray) -> tuple[np.ndarray, bool]:
+def constraint_errors(
+    here: Stance, plan: Coordinates, given: np.ndarray
+) -> tuple[np.ndarray, bool]:
     """h, limb by limb, world axes [m, rad]; a planar contact's in its own axes.
 
     And whether a foot faces away from where it should, where the turn's error says little.
