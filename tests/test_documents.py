@@ -42,6 +42,7 @@ def test_example_runs_and_its_numbers_hold(example):
         "docs/explore.md",
         "docs/logs.md",
         "docs/maps.md",
+        "docs/optimise.md",
         "docs/postures.md",
         "docs/uncertainty.md",
     ],

@@ -33,6 +33,7 @@ from copsense.maps.map_statistics import FailedPosture, MapSummary, WorstPosture
 from copsense.maps.marginals import Marginal
 from copsense.maps.sampling import Axis, Grid
 from copsense.margins import margin_table
+from copsense.optimisation import pareto_front
 from copsense.path import LateralPath
 from copsense.posture_run import PostureRun
 from copsense.pushes import push_limits
@@ -167,6 +168,8 @@ def all_results(icub) -> dict[str, object]:
         "pushes": push_limits(icub, "chest", [LENGTH], LIMITS),
         "design": copsense.design_criterion(path, copsense.Limits(), LENGTHS, grid=2),
         **{f"family {name}": family for name, family in families(icub).items()},
+        "optimum": copsense.optimise(bar, over={"com_y": 0.02}, starts=1),
+        "front": pareto_front(bar, ("travel", "torque"), over={"com_y": 0.02}, points=2, starts=1),
         "sweep": copsense.sweep(path, [TORQUE]),
         "prediction": predict(lateral_reference(icub, Hold()), TORQUE),
         "prediction of a sway": predict(lateral_reference(icub, Sine(2e-3, 0.5)), TORQUE),

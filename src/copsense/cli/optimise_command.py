@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _UNITS: dict[str, Unit | None] = {
     "travel": "m",
+    "sideways": "m",
     "push": "N",
     "torque": "Nm",
     "margin": None,
@@ -46,8 +47,9 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
     default="travel",
     show_default=True,
     metavar="NAME",
-    help="travel (of the CoM to a limit), margin (share of the limits that is left) or push (the "
-    "least that is not borne) are made large; gain (|dCoP/dCoM|) or torque (norm) small.",
+    help="travel (of the CoM to a limit, any way), sideways (the same to the sides alone), margin "
+    "(share of the limits that is left) or push (the least that is not borne) are made large; gain "
+    "(|dCoP/dCoM|) or torque (norm) small.",
 )
 @click.option(
     "--over",

@@ -16,18 +16,26 @@ from copsense.design import Family, family_named
 from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
 from copsense.limits import Limits, check_limits
 from copsense.listing import first_few, listed
-from copsense.optimisation.optimum import PROVEN, Binding, ExactTravel, Front, Optimum, Valuation
+from copsense.optimisation.optimum import (
+    PROVEN,
+    SIDES,
+    Binding,
+    ExactTravel,
+    Front,
+    Optimum,
+    Valuation,
+)
 from copsense.optimisation.posture_program import PostureProgram
 from copsense.optimisation.quantities import (
-    ALONG_PATHS,
     QUANTITIES,
+    TRAVELS,
     Gauge,
     Quantity,
     quantity_named,
     way_of,
 )
-from copsense.optimisation.solver import Solution, least_violation, solve
-from copsense.optimisation.starts import starts_of
+from copsense.optimisation.solver import Solution, judge, least_violation, solve
+from copsense.optimisation.starts import starts_of, weights_tried
 from copsense.optimisation.variables import (
     Range,
     Variables,
@@ -53,6 +61,7 @@ _NEAR = 0.3  # of the variables: the paths' ends follow the posture so far, all 
 _ROUNDS = 4  # of these
 _ROUNDING = 1e-9  # relative, of a travel
 _SAME = 1e-4  # relative: a travel that changed less is the same
+_CROSSED = 1e-6  # of the constraints, by which a place may break them
 _STILL = 1e-7  # of the variables: slopes under which a coordinate moves nothing
 _SPREAD = 0.01  # relative: starts that end farther apart than this ended in different optima
 
@@ -110,8 +119,8 @@ def optimise(
         stance: robot, contacts, and what does not vary.
         criterion: what shares the load; default ``minimum_torque()``.
         limits: what the wrenches and torques must respect; default ``Limits()``.
-        objective: ``"travel"``, ``"margin"`` or ``"push"``, to be made large, or ``"gain"`` or
-            ``"torque"``, to be made small; see `QUANTITIES`.
+        objective: ``"travel"`` (any horizontal way), ``"sideways"``, ``"margin"`` or ``"push"``, to
+            be made large, or ``"gain"`` or ``"torque"``, to be made small; see `QUANTITIES`.
         over: what varies: coordinate of `copsense.batch.PostureChart` -> lowest and highest value
             [m, rad], or how far to either side, or None for the usual range. ``"com"``, ``"turn"``
             (of the base), ``"joints"`` (off the limbs in contact) and ``"feet"`` stand for several.
@@ -172,8 +181,11 @@ def optimise(
     reached = tuple(s.value if s.feasible else math.nan for s in solutions)
     taken = sum(s.iterations for s in solutions)
     exact = False
-    if wanted.name == "travel":
-        refined = _exactly(question, required, best, iterations, progress)
+    if wanted.name in TRAVELS:
+        places = [begin[0], *(s.x for s in solutions if s.feasible)]
+        if question.variables.family is not None:
+            places += weights_tried(question.variables, begin[0])
+        refined = _exactly(question, wanted, required, places, iterations, progress)
         if refined is not None:
             program, best, exact = (*refined, True)
             taken += best.iterations
@@ -247,7 +259,7 @@ def pareto_front(
     begin = starts_of(question.program(first, required), starts, seed)
     far, near = ends(first, {}, begin), ends(second, {}, begin)
     if not far.feasible:
-        raise _unreachable(question.program(first, required), begin, iterations)
+        far = _from_feasible(question.program(first, required), begin, iterations, progress)
 
     def second_at(x: np.ndarray) -> float:
         return _measured(question, second, x)
@@ -379,22 +391,22 @@ def _from_feasible(
     Raises:
         UnreachablePostureError: they are broken there too.
     """
-    x, _, _ = least_violation(program, begin[0], iterations=iterations)
-    found = solve(program, x, iterations=iterations, progress=progress)
-    if not found.feasible:
-        raise _unreachable(program, begin, iterations)
-    return found
+    x, violation, names = least_violation(program, begin[0], iterations=iterations)
+    if not names:
+        found = solve(program, x, iterations=iterations, progress=progress)
+        if found.feasible:
+            return found
+    raise _unreachable(program, len(begin), iterations, violation, names)
 
 
 def _unreachable(
-    program: PostureProgram, begin: list[np.ndarray], iterations: int
+    program: PostureProgram, begun: int, iterations: int, violation: float, names: tuple[str, ...]
 ) -> UnreachablePostureError:
-    _, violation, names = least_violation(program, begin[0], iterations=iterations)
     robot = program.stance.robot.name
     if not names:
         return UnreachablePostureError(
             f"no posture of {robot!r} that keeps all constraints was found from "
-            f"{'one start' if len(begin) == 1 else f'{len(begin)} starts'} within {iterations} "
+            f"{'one start' if begun == 1 else f'{begun} starts'} within {iterations} "
             "iterations, though the solver found no contradiction. Give more --iterations or "
             "--starts, or begin nearer (--at)."
         )
@@ -418,18 +430,41 @@ def _short(name: str) -> str:
 
 def _exactly(
     question: _Question,
+    objective: Quantity,
     required: Mapping[str, float],
-    best: Solution,
+    places: list[Float[np.ndarray, " k"]],
     iterations: int,
     progress: Progress | None,
 ) -> tuple[PostureProgram, Solution] | None:
-    """Maximise the exact path's travel from where its first order is largest.
+    """Maximise the exact paths' travel from the place where it is largest.
+
+    Args:
+        question: what is asked.
+        objective: which travel.
+        required: bounds on other quantities.
+        places: variables to choose from; what breaks a constraint is passed over.
+        iterations: at most.
+        progress: called with 1 after each.
 
     Returns:
         The program and the best place that was found; None where there is nothing to gain.
     """
-    found, taken, kept, program = best, 0, None, question.program(QUANTITIES["travel"], required)
-    travels = _reached(program, best.x)
+    taken, program = 0, question.program(objective, required)
+    ways = SIDES if objective.name == "sideways" else None
+    best, x = -math.inf, places[0]
+    travels: tuple[ExactTravel, ...] = ()
+    for place in places:
+        if program.broken(place) > _CROSSED:
+            continue
+        there = _reached(program, place, ways)
+        value = min([t.distance for t in there], default=-math.inf)
+        if objective.name == "travel":  # any way, which the paths along the axes are not
+            value = min(value, program.value(program.at(place)))
+        if value > best:
+            best, travels, x = value, there, place
+    if not travels:
+        return None
+    kept = None
     for _ in range(_ROUNDS):
         reached = min((t.distance for t in travels), default=0.0)
         if not (math.isfinite(reached) and reached > 0):
@@ -439,31 +474,37 @@ def _exactly(
             for t in travels
             if t.distance < _FARTHER * reached
         )
-        program = question.program(ALONG_PATHS, required)
+        program = question.program(replace(objective, along=True), required)
         found = solve(
             program,
-            found.x,
+            x,
             iterations=min(_REFINING, iterations),
             region=_NEAR,
             progress=progress,
         )
         taken += found.iterations
-        travels = _reached(program, found.x) if found.feasible else ()
+        travels = _reached(program, found.x, ways) if found.feasible else ()
         travel = min((t.distance for t in travels), default=-math.inf)
         if not travel >= reached * (1 - _ROUNDING):
             break
-        kept = program, replace(found, iterations=taken)
+        x, kept = found.x, (program, replace(found, iterations=taken))
         if travel - reached <= _SAME * travel:
             break
+    if kept is None and question.gauge.ends:
+        kept = program, judge(program, x, taken, False, "nothing was gained along the exact path")
     return kept
 
 
-def _reached(program: PostureProgram, x: Float[np.ndarray, " k"]) -> tuple[ExactTravel, ...]:
+def _reached(
+    program: PostureProgram, x: Float[np.ndarray, " k"], ways: tuple[str, ...] | None
+) -> tuple[ExactTravel, ...]:
+    """The exact travels at some variables, all or those of some ways; none where it has none."""
     try:
         here = program.settled(x)
-        return _travels(here, program.criterion(x), program.gauge.limits)
+        found = _travels(here, program.criterion(x), program.gauge.limits)
     except CopsenseError:
         return ()
+    return tuple(t for t in found if ways is None or t.way in ways)
 
 
 def _travels(stance: Stance, criterion: Criterion, limits: Limits) -> tuple[ExactTravel, ...]:

@@ -20,6 +20,7 @@ from copsense.stance import Stance
 if TYPE_CHECKING:
     from copsense.plots.style import Figure
 
+SIDES = ("+y", "-y")
 PROVEN = 1e-3  # of the KKT conditions' residual, under which a place is a local optimum
 
 
@@ -97,6 +98,11 @@ class Valuation(ShortRepr):
         """The smaller of `exact_travel` and the travel any other way, to first order [m]."""
         return min(self.exact_travel, self.quantities["travel"])
 
+    @property
+    def sideways_travel(self) -> float:
+        """The smaller of the exact travels to both sides [m]."""
+        return min((t.distance for t in self.travels if t.way in SIDES), default=math.nan)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data, without posture and criterion."""
         travels = {t.way: {"distance": t.distance, "limit": t.limit} for t in self.travels}
@@ -104,6 +110,7 @@ class Valuation(ShortRepr):
             "quantities": dict(self.quantities),
             "exact_travel": travels,
             "smallest_travel": self.smallest_travel,
+            "sideways_travel": self.sideways_travel,
             "coordinates": dict(self.coordinates),
             "parameters": dict(self.parameters),
         }
@@ -171,6 +178,9 @@ class Optimum(ShortRepr):
         if self.objective == "travel":
             a, b = self.before.smallest_travel, self.after.smallest_travel
             what = "smallest travel"
+        if self.objective == "sideways":
+            a, b = self.before.sideways_travel, self.after.sideways_travel
+            what = "exact travel to both sides"
         if not math.isfinite(a) or a == 0:
             return f"{what} {quantity.shown(b)}, where there was none"
         return f"{what} {quantity.shown(a)} -> {quantity.shown(b)} ({(b / a - 1) * 100:+.1f} %)"
@@ -302,7 +312,7 @@ def _moved(found: Optimum) -> list[str]:
 def _held(found: Optimum) -> list[str]:
     lines = []
     rows = [b.name for b in found.binding if b.kind == "objective"]
-    if len(rows) > 1 or found.objective in ("travel", "margin", "push"):
+    if len(rows) > 1 or QUANTITIES[found.objective].sign > 0:
         lines.append(f"limited by: {_names(rows)}")
     others = [b for b in found.binding if b.kind != "objective"]
     unit = QUANTITIES[found.objective].unit

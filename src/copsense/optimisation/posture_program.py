@@ -47,11 +47,13 @@ class Point(ShortRepr):
         equal: what is to be zero (m,).
         rows: of the objective, to be at least t (r,).
         rest: what is to be at least zero (c,).
+
+    Of derivatives each has a second dimension, the variables.
     """
 
-    equal: Float[np.ndarray, " m"]
-    rows: Float[np.ndarray, " r"]
-    rest: Float[np.ndarray, " c"]
+    equal: Float[np.ndarray, "m *d"]
+    rows: Float[np.ndarray, "r *d"]
+    rest: Float[np.ndarray, "c *d"]
 
 
 class PostureProgram:
@@ -200,6 +202,11 @@ class PostureProgram:
             rows = np.full(len(self.row_names), _FAILED)
             rest = np.full(len(self.rest_names), _FAILED)
         return Point(_TENTH * errors, rows, rest)
+
+    def broken(self, x: Float[np.ndarray, " k"]) -> float:
+        """By how much some variables break a constraint, apart from the bounds."""
+        point = self.at(x)
+        return max(float(np.abs(point.equal).max(initial=0.0)), float(-point.rest.min(initial=0.0)))
 
     def value(self, point: Point) -> float:
         """The objective, in its own unit."""

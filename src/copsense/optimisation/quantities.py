@@ -42,6 +42,7 @@ class Quantity:
         sign: +1 where more is better, and the least row counts; -1 where less is.
         size: a usual value, which sets the scale of the program.
         words: what it is.
+        along: whether rows at the ends of exact paths belong to it as well, see `Gauge.ends`.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Quantity:
     sign: int
     size: float
     words: str
+    along: bool = False
 
     def value(self, rows: Float[np.ndarray, " r"]) -> float:
         """The quantity, from its rows."""
@@ -67,6 +69,7 @@ QUANTITIES = {
     each.name: each
     for each in (
         Quantity("travel", "m", 1, 0.03, "least travel of the CoM to a limit, to first order"),
+        Quantity("sideways", "m", 1, 0.03, "the same to the sides alone, -y and +y"),
         Quantity("margin", "1", 1, 0.3, "least share of a limit that is left"),
         Quantity("push", "N", 1, 20.0, "least horizontal push that is not borne"),
         Quantity("gain", "1", -1, 1.0, "largest |dCoP/dCoM| of a contact"),
@@ -74,8 +77,8 @@ QUANTITIES = {
     )
 }
 
-ALONG_PATHS = Quantity("travel", "m", 1, 0.03, "least travel of the CoM to a limit, along paths")
-"""The travel with the rows at the ends of exact paths as well, see `Gauge.ends`."""
+TRAVELS = ("travel", "sideways")
+"""Names of the quantities that are travels of the CoM."""
 
 
 def quantity_named(name: object, what: str = "objective") -> Quantity:
@@ -100,8 +103,8 @@ class Gauge:
     Attributes:
         limits: what is not to be broken.
         frame: what is pushed.
-        ends: of the paths of `ALONG_PATHS`: coordinate of the CoM, side, and how far from the
-            middle their rows are looked at [m].
+        ends: of the paths that a quantity `along` them looks at: coordinate of the CoM, side, and
+            how far from the middle [m].
     """
 
     ends: tuple[tuple[str, int, float], ...] = ()
@@ -129,10 +132,10 @@ class Gauge:
 
     def names(self, quantity: Quantity) -> tuple[str, ...]:
         """What each row of a quantity is."""
-        if quantity is ALONG_PATHS:
+        if quantity.along:
             ways = [f"CoM to {way_of(coordinate, side)}" for coordinate, side, _ in self.ends]
             ahead = [f"{name}, {way}" for way in ways for name in self._table.names]
-            return (*self._table.names, *ahead)
+            return (*self._table.names, *ahead) if quantity.name == "travel" else tuple(ahead)
         if quantity.name == "gain":
             return tuple(f"CoP of {name}" for name in self._contacts)
         return ("torques",) if quantity.name == "torque" else self._table.names
@@ -157,9 +160,11 @@ class Gauge:
                 )
             normals, offsets = push_planes(equilibrium.stance, criterion, self.limits, self.frame)
             return _distances(offsets, np.linalg.norm(normals, axis=1), _FAR * self._weight)
-        if quantity is ALONG_PATHS:
-            middle = self.rows(QUANTITIES["travel"], equilibrium)
-            return np.concatenate([middle, *(self._ahead(equilibrium, *end) for end in self.ends)])
+        if quantity.along:
+            ahead = [self._ahead(equilibrium, *end) for end in self.ends]
+            if quantity.name == "travel":  # any other way to first order
+                ahead.insert(0, self.rows(QUANTITIES["travel"], equilibrium))
+            return np.concatenate(ahead)
         forces, torques = equilibrium.derivative(equilibrium.stance.com_motions)
         if quantity.name == "gain":
             change = equilibrium.stance.unstack(forces)
@@ -167,7 +172,8 @@ class Gauge:
             return np.asarray(np.linalg.norm(gain, 2, axis=(1, 2)))
         slack = self._table.slack(equilibrium.contact_forces, equilibrium.torques)
         rates = self._table.slack_rates(forces.T[:, : len(equilibrium.contact_forces)], torques.T)
-        return _distances(slack, np.linalg.norm(rates, axis=0), _FAR)
+        speed = abs(rates[1]) if quantity.name == "sideways" else np.linalg.norm(rates, axis=0)
+        return _distances(slack, speed, _FAR)
 
     def measure(self, quantity: Quantity, equilibrium: StaticEquilibrium) -> float:
         """The quantity at an equilibrium, in its unit."""

@@ -6,7 +6,7 @@ SLSQP is restarted from where it ended, with a fresh model of the curvature, unt
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -22,6 +22,8 @@ _PRECISION = 1e-6  # of t: a round that gains less is the last
 _ROUNDS, _ROUND = 30, 150  # and iterations of one
 _ACTIVE = 1e-5  # of the constraints, from which a bound is reached
 _CROSSED = 1e-6  # of the constraints, by which none may be broken
+_ASTRAY = 0.1  # of the constraints [10 mm, 0.01 rad]: a round that ends so far out has failed
+_SMALLER, _LEAST_REGION = 0.25, 0.02
 _SMALL = 0.05  # of the largest multiplier: what has less does not matter
 
 
@@ -49,8 +51,8 @@ class Solution(ShortRepr):
     iterations: int
     finished: bool
     message: str
-    multipliers: dict[str, float]
-    bounds: dict[int, float]
+    multipliers: Mapping[str, float]
+    bounds: Mapping[int, float]
 
     def __post_init__(self) -> None:
         """Own the arrays."""
@@ -101,7 +103,7 @@ def solve(
         progress: called with 1 after each.
     """
     variables, k = program.variables, len(start)
-    x, best, taken, message, finished = start, -np.inf, 0, "", False
+    x, best, taken, message, finished, anchor = start, -np.inf, 0, "", False, start
     for _ in range(_ROUNDS):
         found, steps, message, by_itself = _round(
             program, x, min(iterations - taken, _ROUND), region, progress, elastic=False
@@ -109,16 +111,28 @@ def solve(
         taken += steps
         x = np.clip(found[:k], variables.lower, variables.upper)
         point = program.at(x)
+        if _broken(point) > _ASTRAY:  # it stepped too far: again from where it was, with care
+            x, region = anchor, region * _SMALLER
         if _broken(point) > _CROSSED:
-            if taken >= iterations:
+            if taken >= iterations or region < _LEAST_REGION:
                 break
             continue
-        t = float(point.rows.min())
+        anchor, t = x, float(point.rows.min())
         finished = bool(by_itself and t - best < _PRECISION * max(abs(t), 1.0))
         best = max(t, best)
         if finished or taken >= iterations:
             break
-    x = _best_kept(program, start, x)
+    return judge(program, _best_kept(program, start, x), taken, finished, message)
+
+
+def judge(
+    program: PostureProgram,
+    x: Float[np.ndarray, " k"],
+    iterations: int,
+    finished: bool,
+    message: str,
+) -> Solution:
+    """What some variables are worth, and how far they are from an optimum."""
     residual, multipliers, bounds = optimality(program, x)
     point = program.at(x)
     return Solution(
@@ -126,7 +140,7 @@ def solve(
         program.value(point),
         residual,
         _broken(point),
-        taken,
+        iterations,
         finished,
         message,
         multipliers,
@@ -158,20 +172,22 @@ def least_violation(
     Returns:
         The variables, s, and the names of the constraints that hold it up.
     """
-    k, x = len(start), start
-    size, taken = np.inf, 0
+    k, x, taken, region = len(start), start, 0, _REGION
+    size = _broken(program.at(x), standing=program.objective.sign > 0)
     for _ in range(_ROUNDS):
-        found, steps, _, _ = _round(program, x, iterations - taken, _REGION, None, elastic=True)
+        left = min(iterations - taken, _ROUND)
+        found, steps, _, _ = _round(program, x, left, region, None, elastic=True)
         taken += steps
-        x = np.clip(found[:k], program.variables.lower, program.variables.upper)
-        now = _broken(program.at(x), standing=True)
-        if now < _CROSSED or size - now < 1e-4 * max(now, 1e-3) or taken >= iterations:
+        there = np.clip(found[:k], program.variables.lower, program.variables.upper)
+        now = _broken(program.at(there), standing=program.objective.sign > 0)
+        gained = size - now
+        if gained > 0:
+            x, size = there, now
+        if gained < _PRECISION * 100 * max(size, 1e-3):
+            region *= _SMALLER
+        if size < _CROSSED or region < _LEAST_REGION or taken >= iterations:
             break
-        size = now
-    point = program.at(x)
-    s = _broken(point, standing=True)
-    names = _demands(program, x, point, s)
-    return x, s, names
+    return x, size, _demands(program, x, program.at(x), size)
 
 
 def optimality(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -11,7 +12,9 @@ from copsense.batch import PostureChart
 from copsense.batch.postures.coordinates import chart_coordinates
 from copsense.maps.sampling import Axis, Sample
 from copsense.optimisation.posture_program import PostureProgram
+from copsense.optimisation.variables import Variables
 
+_WEIGHTS = 49  # sets of parameters of a criterion that are looked at
 _SAMPLES = 96  # postures that are looked at
 _NEARER = (1.0, 0.5, 0.25, 0.1)  # shares of the ranges, in turn: far out few postures are reached
 
@@ -36,6 +39,17 @@ def starts_of(program: PostureProgram, count: int, seed: int) -> list[Float[np.n
         away = [min(float(np.linalg.norm(x - other)) for other in found) for x in better]
         found.append(better.pop(int(np.argmax(away))))
     return found
+
+
+def weights_tried(
+    variables: Variables, x: Float[np.ndarray, " k"]
+) -> list[Float[np.ndarray, " k"]]:
+    """Variables with the criterion's parameters on a grid over their bounds, the posture kept."""
+    first = len(variables.index)
+    low, high = variables.lower[first:], variables.upper[first:]
+    count = max(n for n in range(2, 8) if n ** len(low) <= _WEIGHTS or n == 2)
+    axes = [np.linspace(a, b, count) for a, b in zip(low, high, strict=True)]
+    return [np.concatenate([x[:first], logs]) for logs in product(*axes)]
 
 
 def _sample(program: PostureProgram, seed: int) -> list[tuple[float, np.ndarray]]:

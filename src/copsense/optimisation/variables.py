@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from copsense.arrays import check_type, finite_number
 from copsense.batch.postures.coordinates import (
@@ -84,7 +85,7 @@ class Variables(ShortRepr):
         """The criterion's parameters there."""
         return tuple(float(value) for value in np.exp(x[len(self.index) :]))
 
-    def at(self, given: np.ndarray, parameters: Sequence[float] = ()) -> Float[np.ndarray, " k"]:
+    def at(self, given: np.ndarray, parameters: ArrayLike = ()) -> Float[np.ndarray, " k"]:
         """The variables of given numbers and parameters, moved inside the bounds."""
         inside = np.concatenate([given[self.index] * self.scale, np.log(parameters)])
         return np.clip(inside, self.lower, self.upper)

@@ -19,6 +19,7 @@ from copsense.plots.style import (
     whole_figure,
 )
 
+_SEEN = {"behind": "from behind", "right": "from its right"}
 _WORDS = tuple(f"{when}, {side}" for when in ("before", "after") for side in SIDES)
 
 
@@ -45,7 +46,7 @@ def plot_optimum(optimum: Optimum, *, axes: Panels | None = None) -> Figure:
             ax = next(panels)
             _draw(ax, value, side)
             heights.append(ax.get_ylim())
-            ax.set_title(f"{when}, {ax.get_title()}")
+            ax.set_title(f"{when}, {_SEEN[side]}")
     for number, ax in enumerate(drawn):  # one height, so that what went down is seen
         ax.set_ylim(min(low for low, _ in heights), max(high for _, high in heights))
         ax.set_ylabel("z [mm]" if number == 0 else "")
