@@ -115,7 +115,9 @@ def lines(arguments):
     yield ""
     yield "`python benchmarks/optimisation.py --write benchmarks/optimisation.md`. The iCub preset"
     yield "under minimum torque; CoM and orientation of the base vary (20 deg about each axis), and"
-    yield "the feet where said. Knees 2 deg from their limits and from straight. Travels in mm, along"
+    yield (
+        "the feet where said. Knees 2 deg from their limits and from straight. Travels in mm, along"
+    )
     yield "exact paths to both sides, the smaller one; seconds of one process."
     yield ""
     yield f"Python {platform.python_version()}, SciPy {scipy.__version__}, {platform.machine()},"
@@ -138,7 +140,9 @@ def lines(arguments):
         )
     yield ""
     yield "The best of a map's sample, of those that keep the constraints; the second row of each"
-    yield "within a tenth of the ranges around the optimum. Smallest travel: to first order any way,"
+    yield (
+        "within a tenth of the ranges around the optimum. Smallest travel: to first order any way,"
+    )
     yield f"and exact to both sides, of the {LOOKED_AT} best to first order."
     yield ""
     yield "| | samples | kept | first order, best | optimum | smallest travel, best | optimum |"
@@ -159,7 +163,9 @@ def lines(arguments):
     asked = {"objective": "sideways", "over": ["com"], **CONSTRAINTS}
     under = copsense.optimise(stance, design.criterion, **asked)
     both = copsense.optimise(stance, family="joints", **asked)
-    yield "Under a criterion of its own (family joints, objective sideways, the CoM varies): weights"
+    yield (
+        "Under a criterion of its own (family joints, objective sideways, the CoM varies): weights"
+    )
     yield f"alone, `copsense design`, {design.score.travel * 1e3:.2f} mm; the posture under that"
     yield f"criterion {sideways(under.after) * 1e3:.2f} mm; posture and weights together"
     yield f"{sideways(both.after) * 1e3:.2f} mm."

@@ -32,6 +32,7 @@ def plot_optimum(optimum: Optimum, *, axes: Panels | None = None) -> Figure:
         axes: where to draw: before from behind and from the right, then after; default a new
             figure.
     """
+    figure: Figure
     if axes is None:
         figure = new_figure(9.6, 5.2)
         drawn = list(figure.subplots(1, 4, sharey=True))
@@ -63,6 +64,7 @@ def plot_front(front: Front, *, ax: Axes | None = None) -> Figure:
         front: what `copsense.optimisation.pareto_front` found.
         ax: where to draw; default a new figure, with the robot at both ends beside it.
     """
+    figure: Figure
     if ax is None:
         figure = new_figure(8.6, 4.4)
         ax, one, other = figure.subplots(1, 3, width_ratios=(2.2, 1.0, 1.0))
