@@ -11,7 +11,7 @@ from copsense.batch import PostureChart
 from copsense.errors import InvalidInputError, UnknownNameError, UnreachablePostureError
 from copsense.limits import NO_LIMITS, Limits
 from copsense.optimisation import QUANTITIES, optimise, pareto_front
-from copsense.optimisation.quantities import Gauge
+from copsense.optimisation.objectives import Gauge
 from copsense.pushes import push_limits
 from copsense.robot import Robot
 from copsense.scan import limit_travel

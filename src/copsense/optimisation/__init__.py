@@ -4,9 +4,9 @@
 torque; `pareto_front` for what one of them costs of another.
 """
 
+from copsense.optimisation.objectives import QUANTITIES, Quantity
 from copsense.optimisation.optimising import optimise, pareto_front
 from copsense.optimisation.optimum import Binding, ExactTravel, Front, Optimum, Valuation
-from copsense.optimisation.quantities import QUANTITIES, Quantity
 
 __all__ = [
     "QUANTITIES",

@@ -16,6 +16,14 @@ from copsense.design import Family, family_named
 from copsense.errors import CopsenseError, InvalidInputError, UnreachablePostureError
 from copsense.limits import Limits, check_limits
 from copsense.listing import first_few, listed
+from copsense.optimisation.objectives import (
+    QUANTITIES,
+    TRAVELS,
+    Gauge,
+    Quantity,
+    quantity_named,
+    way_of,
+)
 from copsense.optimisation.optimum import (
     PROVEN,
     SIDES,
@@ -26,14 +34,6 @@ from copsense.optimisation.optimum import (
     Valuation,
 )
 from copsense.optimisation.posture_program import PostureProgram
-from copsense.optimisation.quantities import (
-    QUANTITIES,
-    TRAVELS,
-    Gauge,
-    Quantity,
-    quantity_named,
-    way_of,
-)
 from copsense.optimisation.solver import Solution, judge, least_violation, solve
 from copsense.optimisation.starts import starts_of, weights_tried
 from copsense.optimisation.variables import (

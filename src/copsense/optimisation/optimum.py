@@ -12,7 +12,7 @@ from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.json_data import json_data
 from copsense.limits import Limits
-from copsense.optimisation.quantities import QUANTITIES
+from copsense.optimisation.objectives import QUANTITIES
 from copsense.optimisation.variables import shown
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance

@@ -25,7 +25,7 @@ from copsense.batch.postures.reference_search import (
 from copsense.content import ShortRepr
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError, UnloadedContactError
-from copsense.optimisation.quantities import Gauge, Quantity, quantity_named
+from copsense.optimisation.objectives import Gauge, Quantity, quantity_named
 from copsense.optimisation.variables import Range, Variables, shown
 from copsense.path import COM_COORDINATES
 from copsense.posture import pull_back
