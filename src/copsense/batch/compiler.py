@@ -53,7 +53,7 @@ def bound(kernel: Any, arguments: tuple[Any, ...], what: str) -> Callable[..., A
     """
     new = not is_compiled(kernel)
     if new:
-        _LOG.warning("compiling %s, once on a machine; it takes up to half a minute", what)
+        _LOG.warning("compiling %s, once on a machine; it takes half a minute or so", what)
     start = time.monotonic()
     found: Callable[..., Any] = kernel.compile(tuple(typeof(a) for a in arguments))
     if new:

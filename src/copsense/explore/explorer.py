@@ -216,7 +216,7 @@ class Explorer:
 
     def _compile(self) -> None:
         self._status = (
-            "the search for postures is compiled, once on a machine (up to half a minute); until "
+            "the search for postures is compiled, once on a machine (half a minute or so); until "
             "then one posture at a time"
         )
         self._worker.again()
