@@ -65,14 +65,22 @@ def test_figures_need_nothing_of_another_extra():
     assert done.returncode == 0, done.stderr
 
 
-def test_a_missing_extra_is_one_line_of_the_command(tmp_path):
+@pytest.mark.parametrize(
+    ("extra", "arguments"),
+    [
+        ("plots", "analyse four_bar --plot {}/x.png"),
+        ("map", "map four_bar --over com_y=0:0.01:2 --output {}/x.zarr"),
+    ],
+)
+def test_a_missing_extra_is_one_line_of_the_command(extra, arguments, tmp_path):
     code = "from copsense.cli import main; sys.argv = {}; main()"
-    picture = str(tmp_path / "x.png")
-    done = run(code.format(["copsense", "analyse", "four_bar", "--plot", picture]), "matplotlib")
+    words = ["copsense", *arguments.format(tmp_path).split()]
+    lacking = {"plots": ["matplotlib"], "map": ["xarray", "zarr"]}[extra]
+    done = run(code.format(words), *lacking)
     assert done.returncode == 2
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1
-    assert 'pip install "copsense[plots]"' in errors[0]
+    assert f'pip install "copsense[{extra}]"' in errors[0]
 
 
 def test_every_optional_package_is_in_the_extra_that_its_error_names():

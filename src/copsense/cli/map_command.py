@@ -15,6 +15,7 @@ from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar,
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.extras import require
 
 if TYPE_CHECKING:
     from copsense.maps import Axis, MapSummary
@@ -107,6 +108,8 @@ def map_command(
     a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
     reached or evaluated is a row with its reason, and makes the exit code 1.
     """
+    require("zarr", "a map's store")  # its extra brings what else a map needs
+
     from copsense.batch import BatchKernel, PostureChart
     from copsense.files import check_output
     from copsense.maps import MapPlan
