@@ -13,7 +13,7 @@ import numpy as np
 from copsense._version import __version__
 from copsense.errors import InvalidInputError
 from copsense.explore.drawing import Colour, criterion_colours
-from copsense.explore.film import film_html
+from copsense.explore.film import client_notices, film_html
 from copsense.explore.model import Model
 from copsense.explore.playback import frame_rows
 from copsense.explore.played_model import PlayedModel
@@ -236,14 +236,9 @@ def _page(name: str, scene: str, body: Parts, code: str, licences: Sequence[str]
         f"<title>{name}</title><style>{_STYLE}</style></head><body>"
         f"<h1>{name}</h1>{before}{frame}{after}{command}"
         f"<footer>{made}<p>Made by copsense {__version__}; the 3-D view is by viser.</p>"
-        f"<details><summary>Licences of the 3-D view</summary><pre>{_text(_notices())}</pre>"
+        f"<details><summary>Licences of the 3-D view</summary><pre>{_text(client_notices())}</pre>"
         "</details></footer></body></html>\n"
     )
-
-
-def _notices() -> str:
-    """Who wrote what the client holds: the page gives it on, and it says nothing of that itself."""
-    return Path(__file__).with_name("notices.txt").read_text(encoding="utf-8")
 
 
 def _text(value: object) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from copsense.explore.drawing import OPACITY, Scene, Shown, place_camera
 from copsense.explore.server import GuardedServer
@@ -51,6 +52,11 @@ def film_html(
         more += _DARK.format(base64.b64encode(dark.serialize()).decode("ascii"))
     end = page.index("</head>")
     return page[:end] + more + page[end:]
+
+
+def client_notices() -> str:
+    """Who wrote what viser's client holds: a page gives it on, and it says nothing of that."""
+    return Path(__file__).with_name("notices.txt").read_text(encoding="utf-8")
 
 
 def _recorded(  # type: ignore[no-untyped-def]  # viser's serializer

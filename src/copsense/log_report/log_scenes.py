@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 
 from copsense.explore.export import marks_words, played_views
-from copsense.explore.film import film_html
+from copsense.explore.film import client_notices, film_html
 from copsense.explore.playback import frame_rows, run_seconds
 from copsense.explore.played_model import PlayedModel
 from copsense.logs import LogComparison
@@ -35,5 +35,6 @@ def draw_log_scenes(comparison: LogComparison, prefix: str = "log") -> tuple[Rep
             f"{len(rows)} of the {len(model.run)} postures that were compared. "
             f"{marks_words(model.run)}",
             film_html(views, step),
+            client_notices(),
         ),
     )

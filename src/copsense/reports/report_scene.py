@@ -16,6 +16,7 @@ class ReportScene:
         caption: what to see in it.
         html: a page of its own that needs no other file and no network, such as
             `copsense.explore.film` makes.
+        notices: whose work is in it, for whoever gets the report.
     """
 
     name: str
@@ -23,3 +24,4 @@ class ReportScene:
     title: str
     caption: str
     html: str = field(repr=False)
+    notices: str = field(repr=False)

@@ -72,6 +72,7 @@ def test_the_page_needs_nothing_from_elsewhere(page, text):
 def test_the_robot_stands_in_the_page_in_3_d_or_how_to_have_it_does(page, text, reproduction):
     (frame,) = page.all("iframe")
     assert frame["sandbox"] == "allow-scripts"  # it reaches nothing of the page
+    assert "viser contributors" in "".join(page.text["pre"])  # whoever gets it reads whose it is
     assert len(text) < 3e6
     figures = report_figures(reproduction)
     without = render_page(reproduction, {f.name: b"" for f in figures}, figures, command="c")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 
 from copsense.explore.export import marks_words, played_views
-from copsense.explore.film import film_html
+from copsense.explore.film import client_notices, film_html
 from copsense.explore.playback import frame_rows, sweep_run
 from copsense.explore.played_model import PlayedModel
 from copsense.paper.reproduce import Reproduction
@@ -32,6 +32,7 @@ def report_scenes(reproduction: Reproduction) -> tuple[ReportScene, ...]:
             f"by their torque under minimum torque. {marks_words(model.run)} Orange is minimum "
             "wrench, blue minimum torque.",
             film_html(views, seconds),
+            client_notices(),
         ),
     )
 
