@@ -25,7 +25,8 @@ from copsense.sdf import sdf_model_element
 from copsense.xml_numbers import read_numbers
 
 TRIANGLES = 27_000  # of a whole robot: more are slow to send and, without a GPU, to draw
-_CAREFUL = 3.0  # of fast_simplification's 0 (slow, good) to 10
+_CAREFUL, _ROUGH = 3.0, 7.0  # of fast_simplification's 0 (slow, good) to 10
+_NEAR = 1.2  # times what a mesh may keep, from which it is thinned out once more
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -249,12 +250,12 @@ def _reduced(meshes: list[JointMesh], triangles: int) -> list[JointMesh]:
         if count >= len(mesh.faces):
             found.append(mesh)
             continue
-        points, faces = fast_simplification.simplify(
-            np.asarray(mesh.vertices, np.float32),
-            np.asarray(mesh.faces, np.int32),
-            target_reduction=1.0 - count / len(mesh.faces),
-            agg=_CAREFUL,
-        )
+        points, faces = np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32)
+        for care in (_CAREFUL, _ROUGH):  # what is careful may end before it is thin enough
+            if len(faces) > _NEAR * count:
+                points, faces = fast_simplification.simplify(
+                    points, faces, target_reduction=1.0 - count / len(faces), agg=care
+                )
         found.append(JointMesh(mesh.joint, np.asarray(points, float), np.asarray(faces, np.int64)))
     return found
 
