@@ -55,11 +55,14 @@ HELD = {
     "design": "--family mix --grid 3 --com-x=-2mm:2mm:5",
     "map": "--over com_x=-2mm:2mm:5 --output {folder}/map.zarr",
 }
-REMEDIES = {  # command -> its note, with the options to add
-    "balance": re.compile(r"cannot hold this posture at rest .*Give limits \((--limits \S+),"),
+REMEDIES = {  # command -> its note or error, with the options to add
+    "balance": re.compile(
+        r"(?:cannot hold this posture at rest .*Give limits|let them be replaced) "
+        r"\((?:copsense balance )?(--limits \S+|--repair-inertia),"
+    ),
     "map": re.compile(r"To reach them, map over the height too: (--over \S+)"),
 }
-SECONDS = 300
+SECONDS = 900  # the first map on a machine compiles
 
 
 def file_of(package, path, packages):

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from support.commands import copsense as run_command
 from support.driven_robots import everything, standing
 
 import copsense
@@ -275,3 +276,11 @@ def test_a_configuration_and_how_to_stand_up_contradict_each_other(icub, tmp_pat
     path.write_text("width_m = 0.2\n" + path.read_text("utf-8"), encoding="utf-8")
     with pytest.raises(InvalidInputError, match=r"width_m says how to stand up.*Leave one out"):
         copsense.load_stance(path)
+
+
+def test_the_command_says_in_which_stance_file_something_is_wrong(tmp_path):
+    path = tmp_path / "wrong.toml"
+    path.write_text('robot = "icub"\n[posture_m]\nl_knee = 0.3\n', encoding="utf-8")
+    error = run_command("analyse", "--stance", path).error
+    assert "posture_deg or posture_rad" in error
+    assert error.endswith(f"The stance file is {path}.")

@@ -72,7 +72,8 @@ def main() -> None:
         sys.stdout.flush()
         sys.exit(code)
     except CopsenseError as error:
-        click.echo(f"error: {error}", err=True)
+        where = "".join(f" {note}" for note in getattr(error, "__notes__", ()))
+        click.echo(f"error: {error}{where}", err=True)
     except click.ClickException as error:
         error.show()
     except (click.Abort, KeyboardInterrupt):

@@ -146,7 +146,7 @@ def predict(
             f, tau, nu = system.share(system.problem)
             both = [system.weight_derivative(f, nu, change) for change in changes]  # type: ignore[arg-type]
         except CopsenseError as error:
-            error.add_note(f"at row {row}")
+            error.add_note(f"It is row {row} of the measurements.")
             raise
         forces.append(f)
         torques.append(tau)

@@ -98,7 +98,7 @@ def log_statics(
                 try:
                     forces, torque = share_load(stance, criterion, problem)
                 except CopsenseError as error:
-                    error.add_note(f"at row {row} of the log")
+                    error.add_note(f"It is row {row} of the log.")
                     raise
                 wrenches[c, k, m], torques[c, k, m] = stance.unstack(forces), torque
         advance(1)

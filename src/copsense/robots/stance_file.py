@@ -157,7 +157,7 @@ class StanceFile:
         try:
             return self._stance()
         except CopsenseError as error:
-            error.add_note(f"(in the stance file {self.path})")
+            error.add_note(f"The stance file is {self.path}.")
             raise
 
     def _stance(self) -> Stance:

@@ -164,7 +164,7 @@ class Uncertainty(ByContent):
         try:
             return cls.from_dict(data)
         except CopsenseError as error:
-            error.add_note(f"(in the uncertainty {where})")
+            error.add_note(f"It is in the uncertainty {where}.")
             raise
 
     def to_dict(self) -> dict[str, Any]:
