@@ -22,6 +22,9 @@ from copsense.errors import InvalidInputError
 from copsense.qp import linear_minimum
 
 _ROUNDING = 1e-12  # m: how far beyond a line a vertex may be and still be on it
+# m: a centre of pressure this near to its sole's edge is on it, and on the sole: a limit may hold
+# it there.
+ON_EDGE = 1e-9
 _ON_LINE = 1e-9  # m: a point nearer to a segment is on it
 _FLAT = 1e-6  # m: how far a vertex may lie inside the line of its neighbours by rounding
 _AXES = {"x": 0, "y": 1}

@@ -15,6 +15,7 @@ from copsense.cop import contact_cops
 from copsense.criterion import Criterion, check_criterion
 from copsense.errors import InvalidInputError, SensitivityMismatchError
 from copsense.limits import Limits
+from copsense.polygon import ON_EDGE
 from copsense.posture import retract
 from copsense.stance import Stance, check_stance
 from copsense.statics import (
@@ -30,10 +31,9 @@ from copsense.statics import (
 _STEP = 1e-3  # rad and m: the fourth-order stencil's error is near its least here
 # The stencil's error falls with the fourth power where derivatives are large: shares of the step.
 _SHORTER = (1.0, 0.1, 0.01)
-_STILL = 1e-12  # gains under which nothing moves
-_HELD = 1e-9  # gains of a centre of pressure that limits hold at a vertex
+STILL = 1e-12  # gains under which nothing moves
+HELD = 1e-9  # gains of a centre of pressure that limits hold at a vertex
 _LISTED = 6  # contacts that the representation lists
-_ON_EDGE = 1e-9  # m: a limit may hold the centre of pressure on the very edge
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,7 +149,7 @@ class CopSensitivity:
         if not is_admissible(equilibrium.stance, t):
             raise InvalidInputError(f"the tangent moves a contact. {PROJECT}")
         speed = float(np.linalg.norm(equilibrium.stance.com_jacobian[:2] @ t))
-        if not speed > _STILL * max(1.0, float(np.abs(t).max())):
+        if not speed > STILL * max(1.0, float(np.abs(t).max())):
             raise InvalidInputError(
                 "the centre of mass stays over one point along this path: there is no travel to "
                 "measure by. Choose a path that moves it sideways."
@@ -206,7 +206,7 @@ class CopSensitivity:
         """
         share = self.equilibrium.wrenches[:, 2] / self.equilibrium.stance.robot.weight
         speed = np.linalg.norm(self.load_gain, axis=1)
-        still = speed <= _STILL
+        still = speed <= STILL
         return np.where(still, np.copysign(np.inf, share), share / np.where(still, 1.0, speed))
 
     @array_property
@@ -256,18 +256,18 @@ class CopSensitivity:
         for contact, rows in zip(stance.contacts, stance.edges, strict=True):
             if contact.sole is not None and len(contact.sole) == 2:
                 # On the line, whatever side rounding puts it.
-                slack[rows][np.abs(slack[rows]) <= _ON_EDGE] = 0.0
+                slack[rows][np.abs(slack[rows]) <= ON_EDGE] = 0.0
         # An edge that stands still and is passed already leaves no way back.
-        distance = np.where(slack < -_ON_EDGE, -np.inf, np.inf)
+        distance = np.where(slack < -ON_EDGE, -np.inf, np.inf)
         speed = np.hypot(rate[:, 0], rate[:, 1])
-        np.divide(slack, speed, out=distance, where=speed > _STILL)
+        np.divide(slack, speed, out=distance, where=speed > STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
         falls = np.hypot(self.load_gain[:, 0], self.load_gain[:, 1])
-        held = np.abs(self.com_gain).max(axis=(1, 2), initial=0.0) < _HELD
+        held = np.abs(self.com_gain).max(axis=(1, 2), initial=0.0) < HELD
         for k, rows in enumerate(stance.edges):
             if rows.stop > rows.start and held[k]:
                 # At a vertex that limits hold it meets all edges at once, where the load is gone.
-                if falls[k] > _STILL:
+                if falls[k] > STILL:
                     share = self.equilibrium.wrenches[k, 2] / stance.robot.weight
                     travel[k], edge[k] = share / falls[k], 0
             elif rows.stop > rows.start:
@@ -418,7 +418,7 @@ def _compared(found: CopSensitivity) -> dict[str, np.ndarray]:
 def _apart(a: np.ndarray, b: np.ndarray) -> float:
     """Largest difference, relative to the largest entry; zero where all is still."""
     scale = float(np.abs(b).max(initial=0.0))
-    return float(np.abs(a - b).max(initial=0.0)) / scale if scale > _STILL else 0.0
+    return float(np.abs(a - b).max(initial=0.0)) / scale if scale > STILL else 0.0
 
 
 def _sensitivity(

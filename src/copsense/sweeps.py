@@ -24,6 +24,7 @@ from copsense.labelled import LabelledResult, tidy_table
 from copsense.limits import Limits, check_limits
 from copsense.listing import first_few
 from copsense.path import PosturePath, check_path
+from copsense.polygon import ON_EDGE
 from copsense.provenance import made_by, read_plain
 from copsense.sensitivity import CopSensitivity
 from copsense.statics import (
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from copsense.explore.showing import ShownPage
     from copsense.stance import Stance
 
-ON_EDGE = 1e-9  # m: a centre of pressure this near to its sole's edge is on it, and on the sole
 _SHOWN = 5  # criteria, and contacts, that the representation lists
 _COLUMNS = (
     "com",

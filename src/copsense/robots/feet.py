@@ -17,12 +17,11 @@ from copsense.robot import Robot
 from copsense.robots.contact_soles import sole_text
 from copsense.robots.uprighting import upright_contacts
 from copsense.shapes import Geometry, link_shapes, shape_points, whole_robot
-from copsense.sole import Sole, levelled, read_sole
+from copsense.sole import THICKNESS, Sole, levelled, read_sole
 
 _LOW = 0.4  # share of the height under which a link's frames must reach to be looked at
 _NEAR = 0.05  # share of the height within which lowest points are on one ground
 _LEVEL = 0.01  # share of the height within which a foot and its toes are
-_THICKNESS = 1e-3  # m
 _BALL = 0.04  # m: among three feet and more, a narrower sole is a point
 _HIGH = 0.03  # m: a point's frame this high over the ground is not on it
 _UPRIGHT = np.cos(np.radians(0.1))
@@ -257,7 +256,7 @@ def _best_frame(
 ) -> str:
     """Of the frames fixed to a joint: upright, over the sole, at its bottom, first in the file."""
     best: tuple[tuple[float, ...], str] | None = None
-    bottom = None if points is None else points[points[:, 2] <= points[:, 2].min() + _THICKNESS]
+    bottom = None if points is None else points[points[:, 2] <= points[:, 2].min() + THICKNESS]
     for i, frame in enumerate(robot.model.frames):
         bodies = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
         if frame.parentJoint != joint or frame.type not in bodies:

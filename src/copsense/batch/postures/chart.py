@@ -29,11 +29,12 @@ from copsense.batch.postures.coordinates import (
 from copsense.batch.postures.posture_batch import PostureBatch, empty_postures
 from copsense.batch.postures.reference_search import search_one
 from copsense.batch.postures.search_plan import plan_search
-from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK, TOLERANCE
+from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK
 from copsense.batch.workspace import workspace, workspace_offsets
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.path import COM_COORDINATES
+from copsense.posture import TOLERANCE
 from copsense.stance import Stance
 
 _BLOCK = 512  # postures that a thread takes at a time

@@ -35,11 +35,11 @@ from copsense.batch.postures.search_settings import (
     SOLVED,
     STUCK,
     TINY,
-    TOLERANCE,
     UNSOLVED,
 )
 from copsense.batch.vectors import LARGEST_ANGLE
 from copsense.batch.workspace import WIDTH, Offsets
+from copsense.posture import TOLERANCE
 from copsense.stance import AT_LIMIT
 
 

@@ -24,10 +24,10 @@ from copsense.batch.postures.search_settings import (
     SOLVED,
     STUCK,
     TINY,
-    TOLERANCE,
     UNSOLVED,
 )
 from copsense.content import ShortRepr
+from copsense.posture import TOLERANCE
 from copsense.stance import AT_LIMIT, RANK_TOLERANCE, Stance
 
 

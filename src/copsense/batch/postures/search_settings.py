@@ -1,6 +1,5 @@
 """Search settings: what counts as reached, as too long a step, and as hopeless."""
 
-TOLERANCE = 1e-12  # on every constraint [m, rad]
 DAMPING = 0.1  # of |h|^2
 FLOOR = 1e-14  # of the trace of J J'
 TINY = 1e-200  # where nothing moves: no division by zero

@@ -20,10 +20,9 @@ from copsense.batch.statics.inertia import ancestor
 from copsense.batch.statics.loops import factorise
 from copsense.batch.vectors import cross3, load3
 from copsense.batch.workspace import Offsets
+from copsense.polygon import ON_EDGE
+from copsense.sensitivity import HELD, STILL  # what the reference takes for nothing
 
-_STILL = 1e-12  # gains under which nothing moves, as in `CopSensitivity`
-_ON_EDGE = 1e-9  # m: a centre of pressure this far off its sole is on the edge, likewise
-_HELD = 1e-9  # gains of a centre of pressure that limits hold at a vertex, likewise
 _FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways
 
 
@@ -161,8 +160,8 @@ def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
                 v = ax * load(W, gain + 1) + ay * load(W, gain + 3)
                 u, v = margin * load(W, lift) - w * u, margin * load(W, lift + 1) - w * v
                 slack, speed = w * margin, root(u * u + v * v)
-                still = where_less(slack, -_ON_EDGE, splat(-np.inf), splat(np.inf))
-                distance = where_less(_STILL, speed, slack / speed, still)
+                still = where_less(slack, -ON_EDGE, splat(-np.inf), splat(np.inf))
+                distance = where_less(STILL, speed, slack / speed, still)
                 nearest = where_less(distance, free, 1.0 * (e - feet.edge_first[k]), nearest)
                 free = where_less(distance, free, distance, free)
         store(W, offset.margin + k, least)
@@ -174,10 +173,10 @@ def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
                 moves = where_less(moves, entry, entry, moves)
             u, v = load(W, offset.load_gain + 2 * k), load(W, offset.load_gain + 2 * k + 1)
             fall = root(u * u + v * v)
-            empty = where_less(_STILL, fall, w / fall, splat(np.inf))
-            first = where_less(_STILL, fall, splat(0.0), splat(-1.0))
-            free = where_less(moves, _HELD, empty, free)
-            nearest = where_less(moves, _HELD, first, nearest)
+            empty = where_less(STILL, fall, w / fall, splat(np.inf))
+            first = where_less(STILL, fall, splat(0.0), splat(-1.0))
+            free = where_less(moves, HELD, empty, free)
+            nearest = where_less(moves, HELD, first, nearest)
         if travel:
             store(W, offset.travel + k, free)
             store(W, offset.edge + k, nearest)
