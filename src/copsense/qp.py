@@ -1,6 +1,6 @@
 """Qp: the solvers of quadratic and linear programs, their answers validated.
 
-No other module calls daqp, or SciPy's linear programs and non-negative least squares.
+No other module calls daqp, or SciPy's linear programs and bounded least squares.
 `dual_active_set` is the call, for `statics.program.Program`, which solves exactly, with
 `least_distance_multipliers` in reserve; `quick_optimum` is for a control loop, where microseconds
 count and the solver's own precision is enough; `linear_minimum` and `least_relaxation` are linear
@@ -9,6 +9,7 @@ programs.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import daqp
@@ -60,6 +61,18 @@ def least_distance_multipliers(
     except (RuntimeError, ValueError):
         return None
     return np.asarray(u)
+
+
+def bounded_least_squares(
+    A: Float[np.ndarray, "r z"], b: Float[np.ndarray, " r"], lower: Float[np.ndarray, " z"]
+) -> Float[np.ndarray, " z"]:
+    """The x of least |A x - b| that is nowhere below `lower`; the caller looks at what remains."""
+    from scipy.optimize import lsq_linear
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = lsq_linear(A, b, bounds=(lower, np.inf), tol=1e-14, max_iter=500)
+    return np.asarray(found.x)
 
 
 def quick_optimum(

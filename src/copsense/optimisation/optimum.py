@@ -30,11 +30,11 @@ class Binding:
 
     Attributes:
         name: what it is.
-        price: what the objective would gain per unit that it gives way, in the objective's unit per
-            metre or radian; 0 where it is not told, as of a row of the objective itself.
+        price: what the objective would gain per unit that it yields, in the objective's unit per
+            metre or radian; 0 where it is not known, as of a row of the objective itself.
         share: its multiplier beside the others of its kind.
         kind: ``"objective"``, ``"bound"`` or ``"constraint"``.
-        unit: of what would give way, ``"m"``, ``"rad"`` or ``"1"``.
+        unit: of what would yield, ``"m"``, ``"rad"`` or ``"1"``.
     """
 
     name: str

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from copsense.content import ShortRepr, freeze
 from copsense.errors import CopsenseError
 from copsense.optimisation.posture_program import Point, PostureProgram
+from copsense.qp import bounded_least_squares
 
 _REGION = 1.0  # of the variables, to either side of where a round begins: 0.1 m, 57 deg
 _PRECISION = 1e-6  # of t: a round that gains less is the last
@@ -224,8 +225,6 @@ def _multipliers(
     program: PostureProgram, x: np.ndarray, point: Point, t: float, s: float | None
 ) -> tuple[float, dict[str, float], dict[int, float]]:
     """Of the program, or, with a violation s, of the least violation."""
-    from scipy.optimize import lsq_linear
-
     v, k = program.variables, len(x)
     slopes = program.slopes(x, point, fine=True)
     near = _ACTIVE if s is None else max(_ACTIVE, 0.02 * s)
@@ -263,10 +262,7 @@ def _multipliers(
     A = np.array(columns).T
     # Maximise t: -grad t = sum of multipliers times gradients; minimise s: grad s = the same.
     b = np.r_[np.zeros(k), -1.0 if s is None else 1.0]
-    lower = np.r_[np.full(free, -np.inf), np.zeros(A.shape[1] - free)]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        found = lsq_linear(A, b, bounds=(lower, np.inf), tol=1e-14, max_iter=500).x
+    found = bounded_least_squares(A, b, np.r_[np.full(free, -np.inf), np.zeros(A.shape[1] - free)])
     residual = float(np.abs(A @ found - b).max())
     named: dict[str, float] = {}
     for name, value in zip(labels[free:], found[free : len(labels)], strict=True):

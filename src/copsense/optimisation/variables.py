@@ -95,7 +95,7 @@ def shown(value: float, unit: str) -> str:
     """A length in mm or an angle in degrees, as people read them."""
     if unit == "1":
         return f"{value:.4g}"
-    # Plus zero: of what rounds to nothing the sign is not told.
+    # Plus zero: of what rounds to nothing the sign is not shown.
     if unit == "m":
         return f"{round(value * 1e3, 1) + 0.0:.1f} mm"
     return f"{round(math.degrees(value), 2) + 0.0:.2f} deg"
