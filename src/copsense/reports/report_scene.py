@@ -16,7 +16,7 @@ class ReportScene:
         caption: what to see in it.
         html: a page of its own that needs no other file and no network, such as
             `copsense.explore.film` makes.
-        notices: whose work is in it, for whoever gets the report.
+        notices: whose work is in it, for those who get the report.
     """
 
     name: str
