@@ -14,6 +14,7 @@ from copsense.errors import InvalidInputError, OutputError
 from copsense.explore import Model, ShownPage, show
 from copsense.explore.drawing import NAMED
 from copsense.logs import compare_log
+from copsense.optimisation import optimise
 from copsense.posture_run import PostureRun
 from copsense.simulation import Scenario
 
@@ -62,6 +63,10 @@ def test_runs_show_as_films(icub):
     scenario = Scenario(0.1, reference=Sine(0.01, 1.0))
     recording = copsense.balance(icub, copsense.minimum_torque(), scenario)
     assert "minimum-torque, in motion" in words(recording.show(icub))
+    better = optimise(icub, objective="torque", over={"com_z": 0.02}, starts=1, iterations=3)
+    said = words(better.show())
+    assert "2 postures, before (0), after (1)" in said
+    assert "minimum-wrench" not in said  # the criterion that it was optimised under
     comparison = compare_log(small_log(icub), icub, skip=0.0)
     assert f"made up: {len(comparison.times)} postures" in words(show(comparison, rate=2.0))
 

@@ -19,12 +19,13 @@ from copsense.explore.played_model import PlayedModel
 from copsense.files import check_output, write_beside
 from copsense.limits import Limits
 from copsense.logs import LogComparison
+from copsense.optimisation import Optimum
 from copsense.posture_run import PostureRun
 from copsense.simulation import Recording
 from copsense.stance import Stance
 from copsense.sweeps import Sweep
 
-Subject = Stance | Analysis | PostureRun | LogComparison | Recording | Sweep
+Subject = Stance | Analysis | PostureRun | LogComparison | Optimum | Recording | Sweep
 _MADE_OF = (Recording, Sweep)  # do not hold the stance they were made of
 
 
@@ -75,12 +76,12 @@ def show(
     """Show a result in 3-D: a posture as a picture to turn, a run of postures as a film.
 
     Args:
-        subject: a stance, an analysis, a run of postures, a log beside criteria, or a recording or
-            sweep with the stance it was made of.
+        subject: a stance, an analysis, a run of postures, a log beside criteria, an optimum (before
+            and after), or a recording or sweep with the stance it was made of.
         stance: that stance; of the others None.
-        criteria: whose centres of pressure are shown; default an analysis's own, else the paper's
-            two.
-        limits: within which; default an analysis's own, else none.
+        criteria: whose centres of pressure are shown; default those of an analysis or an optimum,
+            else the paper's two.
+        limits: within which; default those of an analysis, else none.
         meshes: show the robot's meshes, which the page then gives on under their licence.
         height: of the frame in a notebook [pixels].
         rate: frames a second of a film.
@@ -134,6 +135,12 @@ def _model(
         run = subject
     elif isinstance(subject, LogComparison):
         run = subject.run
+    elif isinstance(subject, Optimum):
+        both = subject.before, subject.after
+        stances = [each.stance for each in both]
+        run = PostureRun.of_stances(stances, axis="before (0), after (1)", source="the optimum")
+        names = {each.criterion.name: each.criterion for each in both}
+        criteria = list(names.values()) if criteria is None else criteria
     else:
         assert stance is not None
         made = recording_run if isinstance(subject, Recording) else sweep_run

@@ -18,6 +18,7 @@ from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance
 
 if TYPE_CHECKING:
+    from copsense.explore.showing import ShownPage
     from copsense.plots.style import Figure
 
 SIDES = ("+y", "-y")
@@ -184,6 +185,12 @@ class Optimum(ShortRepr):
         if not math.isfinite(a) or a == 0:
             return f"{what} {quantity.shown(b)}, where there was none"
         return f"{what} {quantity.shown(a)} -> {quantity.shown(b)} ({(b / a - 1) * 100:+.1f} %)"
+
+    def show(self) -> ShownPage:
+        """Before and after in 3-D, `copsense.explore.showing.show`."""
+        from copsense.explore.showing import show
+
+        return show(self)
 
     def plot(self) -> Figure:
         """The robot before and after, `copsense.plots.plot_optimum`."""
