@@ -159,7 +159,7 @@ def _measurements(
     late = log.times[aligned.rows] >= skip
     if not late.any():
         raise InvalidInputError(
-            f"{log.source} is over before {skip:g} s. Skip less of its beginning."
+            f"{log.source} is over before {skip:g} s. Skip less of its beginning (skip=, --skip)."
         )
     every = -(-int(late.sum()) // postures)
     rows, motion = aligned.rows[late][::every], aligned.motion
