@@ -81,7 +81,7 @@ def test_the_kernel_equals_the_reference_within_limits(answers, name):
         expected, error = reference_answer(stance.at(q[i]), criterion, limits)
         if isinstance(error, InfeasibleError):
             assert state == INFEASIBLE
-            assert within.relaxation[i] == pytest.approx(error.violation, rel=1e-9)
+            assert within.relaxation[i] == pytest.approx(error.violation, rel=1e-6)
             assert found.reasons[i, j].startswith(str(error)[:60])
             continue
         if isinstance(error, UnloadedContactError):
@@ -246,7 +246,7 @@ def test_without_numba_the_reference_answers_within_limits_too(answers, monkeypa
     np.testing.assert_array_equal(alone.limits.state, found.limits.state)
     np.testing.assert_allclose(alone.torques, found.torques, rtol=0, atol=1e-9)
     np.testing.assert_allclose(alone.limits.margins, found.limits.margins, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(alone.limits.relaxation, found.limits.relaxation, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(alone.limits.relaxation, found.limits.relaxation, rtol=1e-6, atol=0)
     assert alone.reasons.keys() == found.reasons.keys()
     for i, j in np.ndindex(alone.limits.state.shape):
         assert set(alone.limits.pressing[i, j]) == set(found.limits.pressing[i, j])

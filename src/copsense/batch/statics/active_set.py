@@ -31,7 +31,7 @@ EXACT = 1e-12  # weights: by which a row may be broken
 _STEPS = 20  # proximal steps; two to four are usual
 _NEAR, _FAR = 100.0, 1e4  # weights: how far the first proximal step looks, and the last
 _RELAXED = 1e-11  # weights: by which a relaxed row may be broken
-_STILL = 1e-9  # weights: a step that moves less is the last
+_PROVEN = 1e-7  # share of a proximal step that may be left: the linear program's dual residual
 
 
 class Programs(NamedTuple):
@@ -325,11 +325,11 @@ def relax(limits: KernelLimits, p: Programs, n: int, weight: float) -> int:
         q = nearest(limits, p, n, True, _RELAXED * weight)
         if q < 0:
             return FAILED
-        # The linear program's own condition: no step is left, e_t + A' u / far = 0.
+        # The linear program's own condition, e_t + A' u / far = 0: no step is left.
         moved = abs(p.x[n - 1] - p.centre[n - 1] - far)
         for j in range(n - 1):
             moved = max(moved, abs(p.x[j] - p.centre[j]))
-        if moved <= _STILL * weight:
+        if moved <= _PROVEN * far:
             for k in range(q):
                 p.u[k] /= far
             return q
