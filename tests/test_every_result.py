@@ -29,6 +29,7 @@ INTERNAL = (
     "copsense.maps.reduction",
     "copsense.mjcf",
     "copsense.optimisation.posture_program",
+    "copsense.optimisation.question",
     "copsense.optimisation.solver",
     "copsense.optimisation.variables",
     "copsense.paper",

@@ -5,8 +5,9 @@ torque; `pareto_front` for what one of them costs of another.
 """
 
 from copsense.optimisation.objectives import QUANTITIES, Quantity
-from copsense.optimisation.optimising import optimise, pareto_front
+from copsense.optimisation.optimising import optimise
 from copsense.optimisation.optimum import Binding, ExactTravel, Front, Optimum, Valuation
+from copsense.optimisation.pareto_fronts import pareto_front
 
 __all__ = [
     "QUANTITIES",

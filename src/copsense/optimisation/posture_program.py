@@ -93,8 +93,10 @@ class PostureProgram:
             within: coordinate of the CoM -> where it must stay [m].
             distance: between any two contacts, horizontally, least and largest [m].
         """
-        self.stance, self.variables, self.gauge = stance, variables, gauge
-        self.objective = objective
+        self.stance: Stance = stance
+        self.variables: Variables = variables
+        self.gauge: Gauge = gauge
+        self.objective: Quantity = objective
         self.scale: float = _TEN / objective.size
         self._criterion = with_tie_break(stance, criterion)
         self._built: tuple[tuple[float, ...], Criterion] = ((), self._criterion)
@@ -103,7 +105,9 @@ class PostureProgram:
         self._distance = distance
         self._standing = objective.sign < 0 and bool(gauge.names(_MARGIN))
         plan = variables.plan
-        self.equal_names = tuple(f"{name} in place" for name, _ in row_units(stance, plan))
+        self.equal_names: tuple[str, ...] = tuple(
+            f"{name} in place" for name, _ in row_units(stance, plan)
+        )
         self.row_names: tuple[str, ...] = gauge.names(objective)
         names = [f"limit: {n}" for n in gauge.names(_MARGIN)] if self._standing else []
         for quantity, value in self._require:
