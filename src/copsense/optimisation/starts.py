@@ -10,7 +10,6 @@ from jaxtyping import Float
 
 from copsense.batch import PostureChart
 from copsense.batch.postures.coordinates import chart_coordinates
-from copsense.maps.sampling import Axis, Sample
 from copsense.optimisation.posture_program import PostureProgram
 from copsense.optimisation.variables import Variables
 
@@ -54,6 +53,8 @@ def weights_tried(
 
 def _sample(program: PostureProgram, seed: int) -> list[tuple[float, np.ndarray]]:
     """Postures of a sample that can be reached: least row of the objective, and variables."""
+    from copsense.maps.sampling import Axis, Sample  # a map needs xarray, a figure does not
+
     variables, plan = program.variables, program.variables.plan
     names, k = plan.names, len(plan.names)
     position = {int(at): i for i, at in enumerate(variables.index)}
