@@ -21,6 +21,7 @@ from copsense.design import families
 from copsense.errors import InvalidInputError
 from copsense.logs import compare_log
 from copsense.maps import Marginal
+from copsense.optimisation import optimise, pareto_front
 from copsense.plots import limit_plots, log_plots
 from copsense.pushes import push_limits
 from copsense.simulation import Scenario
@@ -92,6 +93,11 @@ def drawn(request, icub, swept, found, compared, run):
         path = copsense.lateral_sweep(bar, -0.03, 0.03, 5)
         design = copsense.design_criterion(path, LIMITS, families(bar)["length"], grid=2)
         return (design,), 2, "designed"
+    if name in ("plot_optimum", "plot_front"):
+        quick = {"over": {"com_z": 0.02}, "starts": 1, "iterations": 3}
+        if name == "plot_front":
+            return (pareto_front(icub, ("gain", "torque"), points=2, **quick),), 1, "before"
+        return (optimise(icub, objective="torque", **quick),), 4, TORQUE.name
     if name == "plot_pushes":
         return (push_limits(icub, criteria=[TORQUE]),), 1, TORQUE.name
     if name == "plot_regions":
