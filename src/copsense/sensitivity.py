@@ -249,9 +249,23 @@ class CopSensitivity:
 
     @cached_property
     def _tipping(self) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
-        stance = self.equilibrium.stance
         # s = w (b - a p) is linear in the wrench: one row gives the slack and its rate.
-        slack = stance.edge_rows.dot(self.equilibrium.wrenches.reshape(-1))
+        wrenches = self.equilibrium.wrenches.reshape(-1)
+        return self.slack_travel(self.equilibrium.stance.edge_rows.dot(wrenches))
+
+    def slack_travel(
+        self, slacks: Float[np.ndarray, " e"]
+    ) -> tuple[Float[np.ndarray, " nc"], Int[np.ndarray, " nc"]]:
+        """How far the CoM may move to first order before slacks of the soles' edges are used up.
+
+        Args:
+            slacks: of each edge, as rows of `Stance.edge_rows` [m]; with those of the equilibrium
+                the answer is `com_travel` and `tipping_edge`.
+
+        Returns:
+            The distance of each contact (nc,) [m], and the edge that it goes to.
+        """
+        stance, slack = self.equilibrium.stance, np.array(slacks)
         rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
         for contact, rows in zip(stance.contacts, stance.edges, strict=True):
             if contact.sole is not None and len(contact.sole) == 2:

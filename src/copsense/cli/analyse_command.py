@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import click
 
@@ -12,11 +12,9 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.uncertainty_option import read_uncertainty, uncertainty_option
 from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
-
-if TYPE_CHECKING:
-    from copsense.uncertainty import Uncertainty
 
 
 @click.command(
@@ -45,12 +43,7 @@ if TYPE_CHECKING:
     help="Say what a sideways sway of this period does to loads and centres of pressure, and up to "
     "which frequency statics are within 5 %.",
 )
-@click.option(
-    "--uncertainty",
-    metavar="FILE",
-    help="Say what errors of the model make of the answer: a file (.toml) of standard deviations, "
-    "or 'default' for what a careful laboratory knows of its robot.",
-)
+@uncertainty_option
 @click.option("--check", is_flag=True, help="Compare the derivatives with finite differences.")
 @click.option("--plot", "picture", type=click.Path(), help="Draw the stance: .png, .svg or .pdf.")
 @click.option(
@@ -122,12 +115,3 @@ def analyse(
         for line in region_lines(answer["regions"]["of"]):
             click.echo(line)
     echo_written(regions, picture)
-
-
-def read_uncertainty(text: str | None) -> Uncertainty | Literal["default"] | None:
-    """``--uncertainty``: a file, or the word ``default``."""
-    from copsense.uncertainty import Uncertainty
-
-    if text is None or text == "default":
-        return text  # type: ignore[return-value]
-    return Uncertainty.read(text)

@@ -13,6 +13,7 @@ from copsense.cli.limit_options import read_limits
 from copsense.cli.place_options import reject_varied
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar, waiting
 from copsense.cli.stance_options import read_stance, stance_options
+from copsense.cli.uncertainty_option import read_uncertainty, uncertainty_option
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.extras import require
@@ -58,7 +59,7 @@ if TYPE_CHECKING:
     type=int,
     metavar="N",
     help="Postures that are evaluated, written and resumed as one.  [default: 4096, or 16384 in a "
-    "map of 262144 or more]",
+    "map of 262144 or more, 128 with an uncertainty]",
 )
 @click.option(
     "--threads", type=int, default=1, show_default=True, help="Chunks evaluated at a time."
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     help="Evaluate on the workers of this Dask scheduler; they must see the output.",
 )
 @click.option("--local", type=int, metavar="N", help="Evaluate on N Dask workers started here.")
+@uncertainty_option
 @click.option("--plot", type=click.Path(), metavar="FILE", help="Draw the map: .png, .svg or .pdf.")
 @click.option("--plot-over", metavar="NAME,NAME", help="Coordinates to draw over; default first 2.")
 @click.option(
@@ -95,6 +97,7 @@ def map_command(
     threads: int,
     scheduler: str | None,
     local: int | None,
+    uncertainty: str | None,
     plot: str | None,
     plot_over: str | None,
     marginal: Any,
@@ -128,11 +131,12 @@ def map_command(
         raise InvalidInputError("--plot-over is for a picture. Give --plot FILE too.")
     chosen = read_criteria(criteria, characteristic_length)
     within = read_limits(limits)
+    unsure = read_uncertainty(uncertainty)
     reject_varied([text.partition("=")[0] for text in over], options)
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
     pair = _pair(plot_over, sampling.names)
-    plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations)
+    plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations, unsure)
     echo_notes(note for note in plan.notes if note not in stance.robot.notes)
     kernel = BatchKernel(stance, plan.criteria, plan.limits)
     with waiting("compiling"):
@@ -241,9 +245,10 @@ def _draw(
     from copsense.skeleton import skeleton
 
     dataset = load_map(summary.path)
+    robust = ["robust_com_travel"] * ("robust_com_travel" in dataset)
     marginals = [
         marginal(dataset, names, quantity, how)
-        for quantity in ("least_com_travel", "largest_com_gain")
+        for quantity in ("least_com_travel", *robust, "largest_com_gain")
     ]
     worst = {
         name: [

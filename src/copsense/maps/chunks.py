@@ -24,6 +24,8 @@ from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore
 from copsense.margins import margin_table
 from copsense.reach import SWEPT, check_within_reach
+from copsense.sensitivity import cop_sensitivity
+from copsense.uncertainty import Uncertainty, robust_com_travel
 
 _PIECE = 4096  # postures that the kernel is given at a time
 
@@ -109,7 +111,27 @@ class ChunkEvaluator:
         }
         if self._within is not None:
             answers |= self._limits(self._within, configurations, result, rows, found)
+        if self.plan.sources:
+            answers |= self._robust(configurations, rows, found)
         return answers
+
+    def _robust(self, configurations: np.ndarray, rows: np.ndarray, found: Chunk) -> Chunk:
+        """What the model's errors leave of the travel, posture by posture."""
+        plan, status, reason = self.plan, found["status"], found["reason"]
+        assert isinstance(plan.uncertainty, Uncertainty)
+        left = np.full((2, len(configurations), len(plan.criteria)), np.nan)
+        for i, q in enumerate(configurations):
+            here = plan.stance.at(q, check=False)
+            for j, criterion in enumerate(plan.criteria):
+                if status[rows[i], j] != EVALUATED:
+                    continue
+                try:
+                    sensitivity = cop_sensitivity(here, criterion)
+                    travels = robust_com_travel(sensitivity, plan.sources, plan.uncertainty.sigmas)
+                    left[:, i, j] = [each.min() for each in travels]
+                except CopsenseError as error:
+                    status[rows[i], j], reason[rows[i], j] = REJECTED, str(error)
+        return {"likely_com_travel": left[0], "robust_com_travel": left[1]}
 
     def _limits(
         self,

@@ -105,6 +105,20 @@ _WITHIN = {
         "d CoP / d CoM within the limits, those that press held",
     ),
 }
+ROBUST = {
+    "likely_com_travel": Column(
+        _EACH,
+        "float32",
+        "m",
+        "what errors of the model leave of least_com_travel, all together",
+    ),
+    "robust_com_travel": Column(
+        _EACH,
+        "float32",
+        "m",
+        "what they leave of it where each is off its worst way",
+    ),
+}
 _CONFIGURATION = Column(
     ("posture", "configuration_index"),
     "float64",
@@ -116,7 +130,8 @@ _CONFIGURATION = Column(
 def coordinate_columns(plan: MapPlan) -> dict[str, Column]:
     """A column for each of the map's coordinates, in their order."""
     chart = PostureChart(plan.stance, plan.sampling.names)
-    taken = {*_COLUMNS, *_WITHIN, "configuration", "done", "posture", "criterion", "contact"}
+    own = {*_COLUMNS, *_WITHIN, *ROBUST}
+    taken = {*own, "configuration", "done", "posture", "criterion", "contact"}
     found: dict[str, Column] = {}
     for name, unit in zip(chart.names, chart.units, strict=True):
         plain = variable_name(name, taken | set(found))
@@ -129,6 +144,8 @@ def columns(plan: MapPlan) -> dict[str, Column]:
     found = coordinate_columns(plan) | _COLUMNS
     if plan.limits is not None:
         found |= _WITHIN
+    if plan.sources:
+        found |= ROBUST
     if plan.configurations:
         found["configuration"] = _CONFIGURATION
     return found

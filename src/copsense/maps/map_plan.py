@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from copsense._version import __version__
 from copsense.arrays import whole_number
@@ -17,9 +17,11 @@ from copsense.maps.sampling import Sample, Sampling
 from copsense.provenance import model_digest, plain
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, with_tie_breaks
+from copsense.uncertainty import Source, Uncertainty, check_uncertain, sources_of
 
 FORMAT = 3  # of the store; counted up when what is written changes
 _SMALL, _LARGE, _MANY = 4096, 16384, 16  # postures of a chunk; the large ones from 16 chunks on
+_SLOW = 128  # of one whose postures take tens of milliseconds each
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,8 +34,11 @@ class MapPlan(ShortRepr):
         sampling: which postures.
         limits: what the wrenches must respect, or None.
         chunk: postures of a chunk, the unit that is written and resumed; given as None, 4096, and
-            16384 in a map of 262144 or more, where each write would cost as much as the numbers.
+            16384 in a map of 262144 or more, where each write would cost as much as the numbers;
+            128 with an uncertainty.
         configurations: whether the configurations are stored too.
+        uncertainty: how far the model may be off, for what that leaves of the travel; or None.
+        sources: the errors that it means here.
         notes: what to know about robot and criteria, such as a tie-break that one was given.
     """
 
@@ -43,6 +48,8 @@ class MapPlan(ShortRepr):
     limits: Limits | None = None
     chunk: int | None = None
     configurations: bool = False
+    uncertainty: Uncertainty | Literal["default"] | None = None
+    sources: tuple[Source, ...] = field(init=False, default=())
     notes: tuple[str, ...] = field(init=False, default=())
 
     def __post_init__(self) -> None:
@@ -60,9 +67,23 @@ class MapPlan(ShortRepr):
                     f"a map takes criteria, not {criterion!r}: a policy's code cannot be "
                     "written into the store. Give Criterion values."
                 )
+        self._take_uncertainty()
         size = _SMALL if len(self.sampling) < _MANY * _LARGE else _LARGE
+        size = size if self.uncertainty is None else _SLOW
         given_size = size if self.chunk is None else self.chunk
         object.__setattr__(self, "chunk", whole_number(given_size, "the size of a chunk"))
+
+    def _take_uncertainty(self) -> None:
+        """Find the errors that an uncertainty means, before any posture is evaluated."""
+        given = self.uncertainty
+        if given is None:
+            return
+        check_uncertain(self.stance)
+        if given == "default":
+            given = Uncertainty.default(self.stance)
+        assert isinstance(given, Uncertainty)
+        object.__setattr__(self, "uncertainty", given)
+        object.__setattr__(self, "sources", sources_of(given, self.stance, self.limits))
 
     @property
     def size(self) -> int:
@@ -84,7 +105,7 @@ class MapPlan(ShortRepr):
         stance, sampling = self.stance, plain(self.sampling)
         if isinstance(self.sampling, Sample):  # a seed may be too long for a float
             sampling |= {"count": int(self.sampling.count), "seed": int(self.sampling.seed)}
-        return {
+        found = {
             "format": FORMAT,
             "copsense": __version__,
             "robot": {"name": stance.robot.name, "model": model_digest(stance)},
@@ -96,3 +117,7 @@ class MapPlan(ShortRepr):
             "chunk": self.size,
             "configurations": bool(self.configurations),
         }
+        if self.uncertainty is not None:
+            assert isinstance(self.uncertainty, Uncertainty)
+            found["uncertainty"] = plain(self.uncertainty.to_dict())
+        return found

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from copsense.maps.map_statistics import MapSummary, summarise
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore, check_store, create_map, open_map
 from copsense.stance import Stance
+from copsense.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +42,7 @@ def map_postures(
     scheduler: str | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    uncertainty: Uncertainty | Literal["default"] | None = None,
 ) -> MapSummary:
     """Evaluate criteria over a space of postures, into a Zarr store at `path`.
 
@@ -65,6 +67,9 @@ def map_postures(
         workers: start this many Dask workers on this machine instead.
         progress: called with the number of postures that each finished chunk has, and at first
             with those that were there already.
+        uncertainty: how far the model may be off (`copsense.uncertainty`): the columns
+            ``likely_com_travel`` and ``robust_com_travel`` then hold what that leaves of the
+            first-order travel, which takes tens of milliseconds a posture.
 
     Returns:
         The reductions over all postures.
@@ -78,7 +83,7 @@ def map_postures(
         MissingExtraError: Zarr or Dask is not installed.
     """
     store = fill_map(
-        MapPlan(stance, criteria, sampling, limits, chunk, configurations),
+        MapPlan(stance, criteria, sampling, limits, chunk, configurations, uncertainty),
         path,
         threads=threads,
         scheduler=scheduler,

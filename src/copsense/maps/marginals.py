@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from copsense.content import freeze
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.maps.columns import EVALUATED
+from copsense.maps.columns import EVALUATED, ROBUST
 from copsense.maps.reduction import QUANTITIES
 from copsense.maps.store import map_parameters
 
@@ -31,7 +31,8 @@ class Marginal:
     Attributes:
         names: of the two coordinates.
         units: of the two.
-        quantity: ``"least_com_travel"`` or ``"largest_com_gain"``.
+        quantity: ``"least_com_travel"`` or ``"largest_com_gain"``; of a map with an uncertainty
+            ``"likely_com_travel"`` or ``"robust_com_travel"`` too.
         how: how the rest was reduced.
         edges: of the cells along each coordinate.
         criteria: names of the criteria.
@@ -74,7 +75,8 @@ def marginal(
     Args:
         dataset: what `load_map` gives.
         over: the two coordinates; default the first two.
-        quantity: ``"least_com_travel"`` or ``"largest_com_gain"``.
+        quantity: ``"least_com_travel"`` or ``"largest_com_gain"``; of a map with an uncertainty
+            ``"likely_com_travel"`` or ``"robust_com_travel"`` too.
         how: ``"worst"`` (least travel, largest gain) or ``"median"`` (the lower one).
 
     Raises:
@@ -82,8 +84,9 @@ def marginal(
         UnknownNameError: a coordinate, quantity or reduction that does not exist.
     """
     known = tuple(dataset.attrs["over"])
-    if quantity not in QUANTITIES:
-        raise UnknownNameError("quantity of a map", quantity, QUANTITIES)
+    drawn = QUANTITIES | {name: 1.0 for name in ROBUST if name in dataset}
+    if quantity not in drawn:
+        raise UnknownNameError("quantity of a map", quantity, drawn)
     if how not in _HOW:
         raise UnknownNameError("way to marginalise", how, _HOW)
     names = known[:2] if over is None else tuple(over)
@@ -106,8 +109,8 @@ def marginal(
         here = dataset.isel(criterion=j)
         found = np.asarray(here[quantity].values, dtype=float)
         kept = (here["status"].values == EVALUATED) & ~np.isnan(found)
-        values[j].ravel()[:] = _reduced(QUANTITIES[quantity] * found[kept], cell[kept], shape, how)
-    values *= QUANTITIES[quantity]
+        values[j].ravel()[:] = _reduced(drawn[quantity] * found[kept], cell[kept], shape, how)
+    values *= drawn[quantity]
     units = tuple(str(dataset[name].attrs.get("units", "")) for name in names)
     return Marginal(
         (names[0], names[1]),

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 # quantity -> (words, unit shown, factor)
 _SHOWN = {
     "least_com_travel": ("CoM travel", "mm", MM),
+    "likely_com_travel": ("CoM travel likely left", "mm", MM),
+    "robust_com_travel": ("CoM travel left at worst", "mm", MM),
     "largest_com_gain": ("CoM gain", "m/m", 1.0),
 }
 _NONE = "no posture was evaluated"

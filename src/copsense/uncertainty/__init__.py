@@ -6,8 +6,10 @@
 
 from copsense.uncertainty.perturbation import perturbed, perturbed_limits
 from copsense.uncertainty.propagation import Spread, propagate_uncertainty, sample_models
+from copsense.uncertainty.robust_com_travel import robust_com_travel
 from copsense.uncertainty.robust_travel import RobustTravel
 from copsense.uncertainty.source import Source
+from copsense.uncertainty.source_changes import check_uncertain
 from copsense.uncertainty.source_list import sources_of
 from copsense.uncertainty.uncertainty_tables import Uncertainty
 
@@ -16,9 +18,11 @@ __all__ = [
     "Source",
     "Spread",
     "Uncertainty",
+    "check_uncertain",
     "perturbed",
     "perturbed_limits",
     "propagate_uncertainty",
+    "robust_com_travel",
     "sample_models",
     "sources_of",
 ]

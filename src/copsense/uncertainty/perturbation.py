@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -91,9 +92,8 @@ def _moved(stance: Stance, given: Sequence[tuple[Source, float]]) -> Stance:
     targets = [
         place * pin.exp6(pin.Motion(d)) for place, d in zip(here.placements, places, strict=True)
     ]
-    # A plane that the contact has left; a point keeps its axes.
     contacts = [
-        replace(contact, plane=_through(place) if contact.kind == "point" else None)
+        replace(contact, plane=_through(place)) if contact.kind == "point" else _freed(contact)
         for contact, place in zip(here.contacts, targets, strict=True)
     ]
     free = Stance(robot, here.q, contacts, False, here.loads)
@@ -102,7 +102,14 @@ def _moved(stance: Stance, given: Sequence[tuple[Source, float]]) -> Stance:
     return solve_posture(free, com=com, targets=targets).stance
 
 
+@lru_cache(maxsize=64)  # samples of one stance share theirs, with all that follows from them
+def _freed(contact: Contact) -> Contact:
+    """The contact without the plane that it leaves."""
+    return replace(contact, plane=None)
+
+
 def _through(place: pin.SE3) -> Plane:
+    """The plane that a point moves to; its axes stay."""
     return Plane(tuple(place.translation.tolist()), tuple(place.rotation[:, 2].tolist()))
 
 

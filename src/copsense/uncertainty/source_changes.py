@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense import rigid_body
+from copsense.arrays import read_only
 from copsense.changes import StanceChange
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
@@ -119,10 +121,11 @@ def joint_displacement(
     return _undetected(stance) @ offsets
 
 
+@lru_cache(maxsize=8)  # of a stance that is sampled
 def _undetected(stance: Stance) -> Float[np.ndarray, "nv n"]:
     """Z Z_j^+: the part of joint offsets that moves no contact; the rest would be seen as a gap."""
     Z = stance.admissible_motions
-    return Z @ np.linalg.pinv(Z[stance.robot.base_nv :], rcond=1e-9)
+    return read_only(Z @ np.linalg.pinv(Z[stance.robot.base_nv :], rcond=1e-9))
 
 
 def inertial_joint(robot: Robot, source: Source) -> int:
