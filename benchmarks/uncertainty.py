@@ -14,7 +14,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy loads its BLAS
 
 import argparse
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from copsense.uncertainty import (
     propagate_uncertainty,
     sample_models,
 )
+from copsense.uncertainty.propagation import SAMPLES
 from copsense.uncertainty.robust_travel import exact_travel
 from copsense.uncertainty.uncertainty_tables import DEFAULT
 
@@ -59,7 +60,8 @@ EVERYTHING = {
 STEPS = {"kg": 2e-2, "m": 2e-4, "rad": 2e-4, "N m": 1e-3, "N": 1e-3, "1": 1e-3}
 STENCIL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
 CHUNK = 500
-LARGE = 6.0  # times the usual deviations
+SCALES = {"icub": (1.0, 6.0), "four_bar": (1.0, 6.0)}  # times the usual deviations
+MANY = ("icub", 1.0)  # of which all models are drawn; of the others a fiftieth
 TEXT = """# Errors of the model
 
 Written by `benchmarks/uncertainty.py`. Minimum torque, the presets' own postures.
@@ -103,27 +105,30 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
     count = given.models
-    lines = [TEXT]
-    for robot in ROBOTS:
-        lines.append(_derivatives(robot))
-        print(lines[-1], end="", flush=True)
-    lines.append(SAMPLED.format(samples=50))
-    travels = []
+    cases = [(robot, scale) for robot in ROBOTS for scale in SCALES.get(robot, (1.0,))]
     with ProcessPoolExecutor(given.workers) as pool:
-        for robot in ROBOTS:
-            for scale in (1.0, LARGE) if robot in ("icub", "four_bar") else (1.0,):
-                many = count if robot in ("icub", "four_bar") and scale == 1.0 else count // 20
-                spread = _spread(robot, scale)
-                called = "usual" if scale == 1 else f"{scale:g} times"
-                for line in _sampled(pool, spread, robot, scale, many):
-                    lines.append(f"| {robot} | {called} {line}")
-                    print(lines[-1], end="", flush=True)
-                each = spread.travels["+y"]
-                exact = "-" if each.exact is None else f"{each.exact * 1e3:.1f}"
-                travels.append(
-                    f"| {robot} | {called} | {each.travel * 1e3:.1f} | {each.likely * 1e3:.1f} | "
-                    f"{each.worst * 1e3:.1f} | {exact} |\n"
-                )
+        spreads = {case: _spread(*case) for case in cases}
+        drawn = {
+            case: _submit(pool, spreads[case], case, count if case == MANY else count // 50)
+            for case in cases
+        }
+        lines = [TEXT]
+        for robot in ROBOTS:  # while the workers are busy
+            lines.append(_derivatives(robot))
+            print(lines[-1], end="", flush=True)
+        lines.append(SAMPLED.format(samples=SAMPLES))
+        travels = []
+        for (robot, scale), spread in spreads.items():
+            called = "usual" if scale == 1 else f"{scale:g} times"
+            for line in _sampled(drawn[robot, scale], spread):
+                lines.append(f"| {robot} | {called} {line}")
+                print(lines[-1], end="", flush=True)
+            each = spread.travels["+y"]
+            exact = "-" if each.exact is None else f"{each.exact * 1e3:.1f}"
+            travels.append(
+                f"| {robot} | {called} | {each.travel * 1e3:.1f} | {each.likely * 1e3:.1f} | "
+                f"{each.worst * 1e3:.1f} | {exact} |\n"
+            )
     lines += [TRAVELS.format(sigmas=spread.sigmas), *travels]
     Path(__file__).with_suffix(".md").write_text("".join(lines), encoding="utf-8")
 
@@ -240,14 +245,18 @@ def _spread(robot: str, scale: float) -> Spread:
     return propagate_uncertainty(stance, TORQUE, Uncertainty.from_dict(usual))
 
 
-def _sampled(
-    pool: ProcessPoolExecutor, spread: Spread, robot: str, scale: float, count: int
-) -> list[str]:
+def _submit(
+    pool: ProcessPoolExecutor, spread: Spread, case: tuple[str, float], count: int
+) -> list[Future[np.ndarray]]:
     if not spread.axes.any():  # contacts are points
         return []
-    seeds = range(max(count // CHUNK, 1))
-    parts = list(pool.map(_chunk, [robot] * len(seeds), [scale] * len(seeds), seeds))
-    cops = np.concatenate(parts)[:, 0]
+    return [pool.submit(_chunk, *case, seed) for seed in range(max(count // CHUNK, 1))]
+
+
+def _sampled(parts: list[Future[np.ndarray]], spread: Spread) -> list[str]:
+    if not parts:
+        return []
+    cops = np.concatenate([part.result() for part in parts])[:, 0]
     good = np.isfinite(cops).all(axis=1)
     values, turn = np.linalg.eigh(spread.covariance[0])
     lines = []

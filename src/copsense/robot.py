@@ -238,6 +238,22 @@ class Robot:
         """
         return replace(self, drives=drives)
 
+    def with_dynamics(self, model: pin.Model, drives: Drives) -> Robot:
+        """The same joints and frames with other masses, gravity or drives.
+
+        Args:
+            model: a copy of the robot's own of which inertias or gravity were changed; it is kept.
+            drives: the drives.
+
+        Raises:
+            InvalidInputError: masses that make no sense.
+            UnknownNameError: drives of a joint or frame that is not in the model.
+        """
+        found = replace(self, model=model, drives=drives)
+        # Frames are the same, and to look up their names takes longer than the statics.
+        found.__dict__["_frame_ids"] = self._frame_ids
+        return found
+
     def without_motors(self, joints: Iterable[str]) -> Robot:
         """The same robot where these joints have no motor.
 

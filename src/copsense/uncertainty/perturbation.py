@@ -47,7 +47,7 @@ def perturbed(stance: Stance, sources: Sequence[Source], errors: Float[np.ndarra
         UnreachablePostureError: the joints cannot follow the contacts.
         InvalidInputError: a link's mass would not be positive.
     """
-    given = [(s, float(e)) for s, e in zip(sources, errors, strict=True) if e]
+    given = [(s, e) for s, e in zip(sources, errors.tolist(), strict=True) if e]
     moved = _moved(stance, [(s, e) for s, e in given if s.kind in _POSTURE])
     of_robot = [(s, e) for s, e in given if s.kind in _ROBOT]
     of_soles = [(s, e) for s, e in given if s.kind == "sole"]
@@ -143,7 +143,7 @@ def _other(robot: Robot, given: Sequence[tuple[Source, float]]) -> Robot:
     drives = robot.drives
     if held != dict(drives.held):
         drives = replace(drives, held=held)
-    return replace(robot, model=model, drives=drives)
+    return robot.with_dynamics(model, drives)
 
 
 def _shifted(contact: Contact, given: Sequence[tuple[Source, float]]) -> Contact:

@@ -1,0 +1,74 @@
+"""What a model's errors leave of the travel, posture by posture of a map."""
+
+import numpy as np
+import pytest
+from support.commands import copsense as command
+
+import copsense
+from copsense.errors import InvalidInputError, OutputError
+from copsense.maps import Axis, Grid, marginal
+from copsense.uncertainty import (
+    Uncertainty,
+    propagate_uncertainty,
+    robust_com_travel,
+    sources_of,
+)
+
+UNSURE = Uncertainty(links={"*": {"mass_percent": 5.0}}, ground={"roll_deg": 0.5})
+GRID = Grid((Axis("com_y", 0.0, 0.02, 2), Axis("com_x", 0.0, 0.01, 2)))
+
+
+@pytest.fixture(scope="module")
+def path(icub, both, tmp_path_factory):
+    where = tmp_path_factory.mktemp("unsure") / "map.zarr"
+    copsense.map_postures(icub, GRID, both, where, configurations=True, uncertainty=UNSURE)
+    return where
+
+
+def test_a_map_holds_what_is_left_of_the_travel_at_each_posture(path, icub, both):
+    dataset, sources = copsense.load_map(path), sources_of(UNSURE, icub)
+    for i, q in enumerate(dataset["configuration"].values):
+        for j, criterion in enumerate(both):
+            found = copsense.cop_sensitivity(icub.at(q), criterion)
+            likely, worst = robust_com_travel(found, sources, UNSURE.sigmas)
+            row = dataset.isel(posture=i, criterion=j)
+            assert row["likely_com_travel"] == pytest.approx(likely.min(), rel=1e-5)
+            assert row["robust_com_travel"] == pytest.approx(worst.min(), rel=1e-5)
+            assert worst.min() < likely.min() < row["least_com_travel"]
+    assert marginal(dataset, quantity="robust_com_travel").values.shape == (2, 2, 2)
+
+
+def test_a_map_of_other_errors_is_another_map(path, icub, both):
+    other = Uncertainty(links={"*": {"mass_percent": 6.0}})
+    with pytest.raises(OutputError, match="other parameters.*uncertainty"):
+        copsense.map_postures(icub, GRID, both, path, configurations=True, uncertainty=other)
+
+
+def test_errors_without_meaning_are_rejected_before_anything_is_written(icub, both, tmp_path):
+    wrong = Uncertainty(contacts={"l_sole": {"friction": 0.1}})
+    with pytest.raises(InvalidInputError, match="the limits have no friction"):
+        copsense.map_postures(icub, GRID, both, tmp_path / "m.zarr", uncertainty=wrong)
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_errors_the_travel_is_left_and_with_small_ones_the_exact_is_near(icub):
+    wrench = copsense.minimum_wrench(1.0)
+    found = copsense.cop_sensitivity(icub, wrench)
+    sources = sources_of(UNSURE, icub)
+    for left in robust_com_travel(found, sources, 1e-12):
+        assert left == pytest.approx(found.com_travel)
+    # Slacks of the minimum wrench are affine in the CoM: what differs is how errors grow on the way.
+    spread = propagate_uncertainty(icub, wrench, UNSURE, samples=0)
+    likely, worst = robust_com_travel(found, sources, UNSURE.sigmas)
+    assert worst.min() == pytest.approx(spread.travels["+y"].worst, abs=1.5e-3)
+    assert likely.min() == pytest.approx(spread.travels["+y"].likely, abs=1.5e-3)
+
+
+def test_the_command_maps_it_too(tmp_path):
+    where = tmp_path / "m.zarr"
+    said = command(
+        *("map", "four_bar", "--criterion", "minimum-torque", "--over", "com_y=0:0.02:2"),
+        *("--uncertainty", "default", "--output", where),
+    )
+    assert said.code == 0, said.err
+    assert np.isposinf(copsense.load_map(where)["robust_com_travel"].values).all()  # no sole
