@@ -40,7 +40,7 @@ def test_a_map_holds_what_is_left_of_the_travel_at_each_posture(path, icub, both
 
 def test_a_map_of_other_errors_is_another_map(path, icub, both):
     other = Uncertainty(links={"*": {"mass_percent": 6.0}})
-    with pytest.raises(OutputError, match="other parameters.*uncertainty"):
+    with pytest.raises(OutputError, match=r"other parameters.*uncertainty"):
         copsense.map_postures(icub, GRID, both, path, configurations=True, uncertainty=other)
 
 
@@ -57,7 +57,7 @@ def test_without_errors_the_travel_is_left_and_with_small_ones_the_exact_is_near
     sources = sources_of(UNSURE, icub)
     for left in robust_com_travel(found, sources, 1e-12):
         assert left == pytest.approx(found.com_travel)
-    # Slacks of the minimum wrench are affine in the CoM: what differs is how errors grow on the way.
+    # Its slacks are affine in the CoM: what differs is how errors grow on the way.
     spread = propagate_uncertainty(icub, wrench, UNSURE, samples=0)
     likely, worst = robust_com_travel(found, sources, UNSURE.sigmas)
     assert worst.min() == pytest.approx(spread.travels["+y"].worst, abs=1.5e-3)

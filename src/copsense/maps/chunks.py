@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
+from copsense.errors import CopsenseError
 from copsense.magnitudes import check_angle
 from copsense.maps.columns import (
     EVALUATED,

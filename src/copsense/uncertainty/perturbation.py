@@ -121,22 +121,9 @@ def _other(robot: Robot, given: Sequence[tuple[Source, float]]) -> Robot:
             held[source.where] = held.get(source.where, 0.0) + error
         elif source.kind == "slope":
             slope[SLOPES[source.part]] = error
-        elif source.kind == "payload":
-            joint = inertial_joint(robot, source)
-            point = robot.frame(source.where).placement.act(np.array(source.point))
-            # Its parameters add up; an inertia of negative mass would not.
-            own = model.inertias[joint].toDynamicParameters()
-            more = pin.Inertia(1.0, point, np.zeros((3, 3))).toDynamicParameters()
-            model.inertias[joint] = pin.Inertia.FromDynamicParameters(own + error * more)
         else:
             joint = inertial_joint(robot, source)
-            body = model.inertias[joint]
-            mass, lever = float(body.mass), np.array(body.lever)
-            if source.kind == "mass":
-                mass += error
-            else:
-                lever[AXES[source.part]] += error
-            model.inertias[joint] = pin.Inertia(mass, lever, np.array(body.inertia))
+            model.inertias[joint] = _body(model.inertias[joint], robot, source, error)
     if slope.any():
         turn = pin.rpy.rpyToMatrix(slope)
         model.gravity.linear = turn.T @ robot.model.gravity.linear
@@ -144,6 +131,26 @@ def _other(robot: Robot, given: Sequence[tuple[Source, float]]) -> Robot:
     if held != dict(drives.held):
         drives = replace(drives, held=held)
     return robot.with_dynamics(model, drives)
+
+
+def _body(body: pin.Inertia, robot: Robot, source: Source, error: float) -> pin.Inertia:
+    """A link's inertia with one error; it may be one that no body has, as statics do not mind."""
+    found = body.copy()
+    mass, lever = float(body.mass), np.array(body.lever)
+    if source.kind == "mass":
+        found.mass = mass + error
+    elif source.kind == "com":
+        lever[AXES[source.part]] += error
+        found.lever = lever
+    else:
+        point = robot.frame(source.where).placement.act(np.array(source.point))
+        arm = point - lever
+        found.mass = mass + error
+        if found.mass > 0:  # the robot rejects another
+            found.lever = lever + error / found.mass * arm
+            about = mass * error / found.mass * ((arm @ arm) * np.eye(3) - np.outer(arm, arm))
+            found.inertia = np.array(body.inertia) + about
+    return found
 
 
 def _shifted(contact: Contact, given: Sequence[tuple[Source, float]]) -> Contact:
