@@ -83,6 +83,8 @@ SAMPLED = """
 Models with random errors, each evaluated whole: the standard deviation of the centre of pressure of
 the first contact along the axes of its ellipse, and to first order. *Report* is what
 `Spread.nonlinearity` says of that contact with its own {samples} models; over 5 % it is a note.
+Where a contact may carry no load (six times the usual errors; a note of its own says so) its centre
+of pressure has no finite spread, and a few models make all of the sampled one.
 
 | robot | errors | models | sampled [mm] | first order [mm] | off | report |
 | --- | --- | --- | --- | --- | --- | --- |

@@ -40,6 +40,14 @@ def test_errors_too_large_for_the_first_order_are_said(icub):
     assert any("hold to first order only" in note for note in spread.notes)
 
 
+def test_contacts_that_may_carry_no_load_are_named(stance_of, usual):
+    stance = stance_of("four_bar")
+    wide = propagate_uncertainty(stance, TORQUE, Uncertainty(ground={"roll_deg": 6.0}), samples=0)
+    assert wide.may_unload == stance.contact_names
+    assert any("may carry no load" in note for note in wide.notes)
+    assert not usual.may_unload
+
+
 def test_models_without_an_answer_are_counted(stance_of):
     spread = propagate_uncertainty(
         stance_of("four_bar"),

@@ -34,6 +34,7 @@ PLANTED = Limits(friction=None, torsion=None)
 SIDES = {"+y": 1, "-y": -1}
 STRAIGHT = 0.05  # of a spread, that what is not linear may add before it is said
 SAMPLES = 50
+_FAR = 5.0  # standard deviations from carrying no load, from which the tail is not felt
 _STILL = 1e-9  # m, of a centre of pressure that does not move
 _LISTED = 4  # contacts that a representation lists
 
@@ -192,6 +193,18 @@ class Spread:
         return self._shared(self.travels[side].rates[None])
 
     @property
+    def may_unload(self) -> tuple[str, ...]:
+        """Contacts whose normal force is within five standard deviations of none.
+
+        Their centre of pressure is a quotient by what may be zero.
+        """
+        stance = self.equilibrium.stance
+        normal = self.equilibrium.wrenches[:, 2]
+        spread = np.linalg.norm(stance.unstack(self.force_rates)[:, 2] * self.deviations, axis=1)
+        near = zip(stance.contact_names, normal, spread, strict=True)
+        return tuple(name for name, force, size in near if force < _FAR * size)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Where the first order does not carry, a sentence each."""
         found = []
@@ -203,6 +216,11 @@ class Spread:
                 f"the ellipses of {listed(bent)} hold to first order only: sampled models spread "
                 f"by {worst:.0%} more or less. For errors so large sample more of them "
                 "(copsense.uncertainty.sample_models)."
+            )
+        if self.may_unload:
+            found.append(
+                f"{listed(self.may_unload)} may carry no load within {_FAR:g} deviations: "
+                "a centre of pressure there has no finite spread, whatever the ellipse."
             )
         if self.lost_samples:
             found.append(
