@@ -51,7 +51,7 @@ def test_the_default_is_drawn_on_the_soles(tmp_path):
         ("[links.ches]\nmass_kg = 1.0", "no link in robot 'icub' named 'ches'. Did you mean chest"),
         ("[links.chest]\nmass_kg = -1.0", "Give a standard deviation, zero or more"),
         ("[contacts.l_sole]\nfriction = 0.1", "the limits have no friction"),
-        ("[links.chest", "is not TOML"),
+        ("[links.chest", "is not valid TOML"),
     ],
 )
 def test_what_is_wrong_is_one_line(tmp_path, text, said):
