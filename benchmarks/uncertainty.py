@@ -32,8 +32,8 @@ from copsense.uncertainty import (
     propagate_uncertainty,
     sample_models,
 )
+from copsense.uncertainty.path_travel import exact_travel
 from copsense.uncertainty.propagation import SAMPLES
-from copsense.uncertainty.robust_travel import exact_travel
 from copsense.uncertainty.uncertainty_tables import DEFAULT
 
 ROBOTS = ("icub", "talos", "g1", "solo12", "four_bar")

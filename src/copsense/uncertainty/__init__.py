@@ -4,10 +4,10 @@
 `propagate_uncertainty` what follows, exact to first order, and how far that carries.
 """
 
+from copsense.uncertainty.path_travel import RobustTravel
 from copsense.uncertainty.perturbation import perturbed, perturbed_limits
+from copsense.uncertainty.posture_travel import robust_com_travel
 from copsense.uncertainty.propagation import Spread, propagate_uncertainty, sample_models
-from copsense.uncertainty.robust_com_travel import robust_com_travel
-from copsense.uncertainty.robust_travel import RobustTravel
 from copsense.uncertainty.source import Source
 from copsense.uncertainty.source_changes import check_uncertain
 from copsense.uncertainty.source_list import sources_of

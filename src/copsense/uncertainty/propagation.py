@@ -22,8 +22,8 @@ from copsense.scan import PathScan
 from copsense.sensitivity import cop_rates
 from copsense.stance import Stance, check_stance
 from copsense.statics import StaticEquilibrium, WrenchPolicy, solve_equilibrium
+from copsense.uncertainty.path_travel import RobustTravel, direct_rates, robust_travel
 from copsense.uncertainty.perturbation import perturbed, perturbed_limits
-from copsense.uncertainty.robust_travel import RobustTravel, direct_rates, robust_travel
 from copsense.uncertainty.source import Source
 from copsense.uncertainty.source_changes import change_of, check_uncertain, row_change
 from copsense.uncertainty.source_list import sources_of
