@@ -223,7 +223,7 @@ def test_a_list_of_configurations_is_followed_in_time(icub, path):
     assert np.abs(error).max() < 1e-2 * scale
     with pytest.raises(InvalidInputError, match=r"no posture at index = 9\.5"):
         instant(listed, 9.5, rate, 0.0)
-    with pytest.raises(InvalidInputError, match="no curve to sway along"):
+    with pytest.raises(InvalidInputError, match="not a curve to sway along"):
         Sway(listed, 1.0)
 
 

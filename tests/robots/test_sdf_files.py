@@ -195,7 +195,7 @@ FAULTS = {
     "has <static>": ("<link name='a'>", "<static>true</static><link name='a'>"),
     "has <gravity>": ("<link name='a'>", "<link name='a'><gravity>0</gravity>"),
     "2 links are named 'a'": ("<link name='b'>", "<link name='a'/><link name='b'>"),
-    "the parent 'zz' of joint 'hinge' is no link": (
+    "the parent 'zz' of joint 'hinge' is not a link of the model": (
         "<parent>base</parent><child>a<",
         "<parent>zz</parent><child>a<",
     ),
