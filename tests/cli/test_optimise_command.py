@@ -59,6 +59,29 @@ def test_a_front_is_a_table_and_a_picture(tmp_path):
     assert "writes one" in both.error
 
 
+def test_a_film_has_the_margins_before_and_after(tmp_path):
+    pytest.importorskip("viser", reason="the extra explore is not installed")
+    page = tmp_path / "both.html"
+    asked = ("--over", "com_z=+-30mm", "--over", "l_sole:y=+-10mm", "--starts", 1, "--export", page)
+    quick = ("--objective", "torque", "--iterations", 3)
+    answer = copsense("optimise", "icub", *asked, *quick)
+    assert answer.code == 0, answer.err
+    assert f"written: {page}" in answer.out
+    said = page.read_text(encoding="utf-8")
+    assert "2 postures, before (0), after (1) from 0 to 1" in said
+    table = said.rpartition("</iframe>")[2]
+    assert "minimum-torque" in table
+    assert "minimum-wrench" not in table  # the criterion that it was optimised under
+    assert copsense("optimise", "icub", *asked, *quick, "--force", "--json").json["export"] == str(
+        page
+    )
+    again = copsense("optimise", "icub", *asked, *quick)
+    assert "exists already" in again.error
+    assert (
+        "--require" in copsense("optimise", "icub", *asked[:-1], "f.html", "--pareto", "gain").error
+    )
+
+
 def test_ranges_are_read_in_their_units():
     stance = load_stance("icub")
     found = read_over(["com_z=450mm:0.5", "pitch=+-10", "l_sole:y", "feet=+-3cm"], stance)

@@ -35,6 +35,7 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
 @click.command(
     epilog="\b\nExamples:\n"
     "  copsense optimise icub --reserve knee=2deg --plot before_after.png\n"
+    "  copsense optimise icub --over com --export before_after.html\n"
     "  copsense optimise icub --over com --over turn --over feet=+-30mm --save-stance wide.toml\n"
     "  copsense optimise icub --objective torque --require travel=45mm --within l_knee=-90:-5\n"
     "  copsense optimise icub --over com --pareto torque --points 5 --plot front.png\n"
@@ -120,7 +121,12 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
     type=click.Path(),
     help="Draw the robot before and after, or the front: .png, .svg or .pdf.",
 )
-@click.option("--force", is_flag=True, help="Overwrite the picture.")
+@click.option(
+    "--export",
+    type=click.Path(),
+    help="Write the robot before and after as a film in 3-D, in one self-contained page: .html.",
+)
+@click.option("--force", is_flag=True, help="Overwrite the picture and the page.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def optimise(
     robot: str | None,
@@ -141,6 +147,7 @@ def optimise(
     pareto: str | None,
     points: int,
     picture: str | None,
+    export: str | None,
     force: bool,
     as_json: bool,
     **options: Any,
@@ -158,6 +165,16 @@ def optimise(
     kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=force)
+    if export is not None:
+        from copsense.extras import require as require_extra
+
+        check_output(export, suffixes=(".html",), overwrite=force)
+        require_extra("viser", "a film in 3-D")
+        if pareto is not None:
+            raise InvalidInputError(
+                "a front has a posture for each point, and --export shows one before and after. "
+                "Leave --pareto out, and give --require to choose the point."
+            )
     if kept is not None:
         check_output(kept, suffixes=(".toml",), overwrite=overwrite)
         if pareto is not None:
@@ -197,11 +214,14 @@ def optimise(
         from copsense.plots import save_figure
 
         save_figure(found.plot(), picture, overwrite=force)
+    if export is not None:
+        found.show().save(export, overwrite=force)
     if as_json:
-        echo_json(found.to_dict() | ({} if picture is None else {"plot": picture}))
+        files = {"plot": picture, "export": export}
+        echo_json(found.to_dict() | {what: file for what, file in files.items() if file})
     else:
         click.echo(str(found))
-        echo_written(picture)
+        echo_written(picture, export)
     if kept is not None:
         file = remembered_stance()
         source, folders = (file.source, file.package_dirs) if file else (robot or "", ())
