@@ -22,7 +22,9 @@ def read_only(array: Array) -> Array:
 
 
 def owned(array: np.ndarray) -> np.ndarray:
-    """A read-only copy of an array."""
+    """A read-only copy of an array; itself where no one can write to it."""
+    if array.base is None and not array.flags.writeable:
+        return array
     return read_only(np.array(array))
 
 

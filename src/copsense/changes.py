@@ -6,7 +6,7 @@ stationarity J nu = W_f (f - f_ref), they are
     d(N - J' f) = A V + dN + Y dpi - dJ' f        at fixed f
     d(J nu)     = D V + dJ nu                      at fixed nu
 
-where A = d(N - J' f)/dq and D = d(J nu)/dq; Y is the regressor of gravity (theory2.md, section 7).
+where A = d(N - J' f)/dq and D = d(J nu)/dq; Y is the regressor of gravity.
 """
 
 from __future__ import annotations

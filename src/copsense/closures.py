@@ -1,7 +1,7 @@
 """Closures: what a robot's own loops and couplings demand of its motion, and their forces.
 
 Each demands rows of zero velocity, J_l v = 0, and answers with forces lam: J_l' lam beside the
-contacts' J' f (theory2.md, section 3).
+contacts' J' f.
 
     coupling    v_i - a v_j
     ball        of R_2' (p_1 - p_2), the gap in the axes of frame b; lam turns with frame b

@@ -103,6 +103,8 @@ def freeze(value: object, *names: str) -> None:
     """
     for name in names:
         found = getattr(value, name)
+        if found is None:
+            continue
         if isinstance(found, np.ndarray):
             found = owned(found)
         elif isinstance(found, Mapping) and not isinstance(found, FrozenMapping):

@@ -15,6 +15,7 @@ from scipy.linalg import lapack
 from copsense.arrays import read_only
 from copsense.row_space import RowSpace
 
+_NOTHING = read_only(np.zeros(0))
 # Curvature (1/m) from which contacts forbid a motion that their Jacobian allows.
 _CURVED = 1e-4
 _MASSLESS = 1e-14  # share of the largest kinetic energy under which a motion moves no mass
@@ -56,6 +57,8 @@ def find_folds(
         curvature: Q = d(J' y)/dq of a combination y (c,).
     """
     u, Z = space.redundant, space.null
+    if not u.shape[1]:
+        return Folds(Z[:, :0], Z.T[:0], _NOTHING, branching=False)
     motions, rows, errors = [Z[:, :0]], [Z.T[:0]], [np.zeros(0)]
     branching = False
     for y in u.T:
@@ -69,11 +72,9 @@ def find_folds(
             errors.append(false.T @ constraints.T @ y)
         elif curved.any():
             branching = True
-    if u.shape[1]:
-        left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
-        motions = [left[:, s > _CURVED]]
+    left, s, _ = np.linalg.svd(np.hstack(motions), full_matrices=False)
     return Folds(
-        read_only(motions[0]),
+        read_only(left[:, s > _CURVED]),
         read_only(np.vstack(rows)),
         read_only(np.concatenate(errors)),
         branching,

@@ -14,12 +14,14 @@ what limits allow, `LimitRows.over_forces`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import read_only
 from copsense.content import ShortRepr
+from copsense.row_space import RowSpace
 from copsense.stance import Stance
 
 
@@ -50,14 +52,12 @@ class LoadProblem(ShortRepr):
     @classmethod
     def of(cls, stance: Stance) -> LoadProblem:
         """The load of a stance: its weight, its inertia, and what else is known to act on it."""
-        robot = stance.robot
-        nb, map_, N = robot.unactuated_nv, stance.constraints.T, stance.balance
-        inertia = stance.mass_matrix[robot.base_nv :, robot.base_nv :]
-        if robot.actuation is not None:
-            map_, N = robot.by_drive(map_), robot.by_drive(N)
-            inertia = robot.actuation.inverse @ inertia @ robot.actuation.inverse.T
-            map_, N, inertia = read_only(map_), read_only(N), read_only(inertia)
-        return cls(map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)
+        return _of(stance)
+
+    @cached_property
+    def equations(self) -> RowSpace:
+        """Which f balance the base: the smallest of them, and what they leave free."""
+        return RowSpace(self.base_map, max(self.base_map.shape) * np.finfo(float).eps)
 
     def torques(self, forces: Float[np.ndarray, " m"]) -> Float[np.ndarray, " n"]:
         """The torques that contact forces take (n,) [Nm]."""
@@ -86,3 +86,15 @@ class LoadProblem(ShortRepr):
     def imbalance(self, forces: Float[np.ndarray, " m"]) -> float:
         """Largest force or moment on the base by which contact forces miss the load [N, Nm]."""
         return float(np.abs(self.base_map.dot(forces) - self.base_wrench).max())
+
+
+@lru_cache(maxsize=4)  # one criterion after another asks at a posture
+def _of(stance: Stance) -> LoadProblem:
+    robot = stance.robot
+    nb, map_, N = robot.unactuated_nv, stance.constraints.T, stance.balance
+    inertia = stance.mass_matrix[robot.base_nv :, robot.base_nv :]
+    if robot.actuation is not None:
+        map_, N = robot.by_drive(map_), robot.by_drive(N)
+        inertia = robot.actuation.inverse @ inertia @ robot.actuation.inverse.T
+        map_, N, inertia = read_only(map_), read_only(N), read_only(inertia)
+    return LoadProblem(map_[:nb], N[:nb], map_[nb:], N[nb:], inertia)

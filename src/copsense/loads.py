@@ -1,7 +1,7 @@
 """Load: a known force of the environment on a robot, beside its weight and its contacts.
 
 A wrench w at a point takes J' w off what the torques and contacts must balance, N = G - J' w. How
-that changes with the posture depends on what the wrench is fixed to (theory2.md, section 1).
+that changes with the posture depends on what the wrench is fixed to.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A push F at a frame takes J_e' F off the balance. Under a criterion the forces a
 so are the rows of the limits, r_i . F <= s_i: its own pushes are their intersection, the largest
 along u is ``min s_i / (r_i . u)+`` and the least of all directions ``min s_i / |r_i|``, across the
 row that yields. What any equilibrium within the limits can answer is the projection of a
-polyhedron, found by linear programs as a region of the CoM is (theory2.md, section 8).
+polyhedron, found by linear programs as a region of the CoM is.
 
 The push is slow, the posture is held, and what is pushed stands still: how far a robot that steps,
 leans or moves its arms can be pushed is another question.

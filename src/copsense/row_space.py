@@ -48,13 +48,13 @@ class RowSpace:
             reflectors = np.zeros((m, m), order="F")
             reflectors[:, :k] = factor
             Q, _, _ = lapack.dorgqr(reflectors, tau, overwrite_a=True)
-            self.rank, self.redundant = k, np.zeros((k, 0))
+            self.rank, self.redundant = k, read_only(np.zeros((k, 0)))
             self._factors = Q[:, :k], factor[:k], order - 1
             null = Q[:, k:]
         else:
             u, s, vt = np.linalg.svd(matrix)
             self.rank = r = int(np.sum(s > tolerance * max(least, s.max(initial=0.0))))
-            self.redundant = u[:, r:]
+            self.redundant = read_only(u[:, r:].copy())
             self._factors = u[:, :r], s[:r], vt[:r]
             null = vt[r:].T
         self.null = read_only(null.copy())

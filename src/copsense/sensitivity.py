@@ -276,14 +276,14 @@ class CopSensitivity:
         speed = np.hypot(rate[:, 0], rate[:, 1])
         np.divide(slack, speed, out=distance, where=speed > STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
-        falls = np.hypot(self.load_gain[:, 0], self.load_gain[:, 1])
         held = np.abs(self.com_gain).max(axis=(1, 2), initial=0.0) < HELD
         for k, rows in enumerate(stance.edges):
             if rows.stop > rows.start and held[k]:
                 # At a vertex that limits hold it meets all edges at once, where the load is gone.
-                if falls[k] > STILL:
+                fall = np.hypot(*self.load_gain[k])
+                if fall > STILL:
                     share = self.equilibrium.wrenches[k, 2] / stance.robot.weight
-                    travel[k], edge[k] = share / falls[k], 0
+                    travel[k], edge[k] = share / fall, 0
             elif rows.stop > rows.start:
                 nearest = int(distance[rows].argmin())
                 travel[k] = distance[rows][nearest]

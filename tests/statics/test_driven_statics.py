@@ -269,7 +269,7 @@ def test_scans_regions_and_analyses_take_loops_and_loads_along(tmp_path):
 
 
 def test_the_region_under_a_load_is_an_affine_image_of_the_region_without():
-    """c = (F_n p + F_z e_xy - e_z F_xy) / (m g), p over the soles (theory2.md, section 1)."""
+    """c = (F_n p + F_z e_xy - e_z F_xy) / (m g), p over the soles."""
     stance = standing(Robot.from_model(rod_biped_model(rods=False)))
     force, weight = np.array([6.0, 8.0, -20.0]), stance.robot.weight
     limits = Limits(friction=None, torsion=None)

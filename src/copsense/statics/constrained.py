@@ -320,7 +320,9 @@ class _Problem:
         self.normal = np.concatenate([rows.normals, np.full(len(rows.joint), -1)])
         self.names, self.kinds = rows.all_names, rows.all_kinds
         E, e = load.base_map.T, load.base_wrench
-        self.program = Program(self.H, self.g, E, e, self.A, self.b, self.weight)
+        self.program = Program(
+            self.H, self.g, E, e, self.A, self.b, self.weight, known=load.equations
+        )
         self.scale = self.program.scale
         self.strong = self.weak = self.tied = np.zeros(len(self.b), dtype=bool)
         self.tie: Lexicographic | None = self._tie()

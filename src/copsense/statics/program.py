@@ -85,6 +85,7 @@ class Program(ShortRepr):
         unit: the size of x that errors are relative to, such as the weight.
         tolerance: violation of an optimality condition, relative, above which an optimum is
             rejected.
+        known: the row space of E', where it was factorised before.
     """
 
     H: Float[np.ndarray, "m m"]
@@ -95,6 +96,7 @@ class Program(ShortRepr):
     b: Float[np.ndarray, " r"]
     unit: float
     tolerance: float = 1e-8
+    known: RowSpace | None = None
 
     def __getstate__(self) -> dict[str, object]:
         """What is pickled: systems are factorised again where they are needed."""
@@ -117,7 +119,7 @@ class Program(ShortRepr):
 
     @cached_property
     def _equations(self) -> RowSpace:
-        return RowSpace(self.E.T, max(self.E.shape) * np.finfo(float).eps)
+        return self.known or RowSpace(self.E.T, max(self.E.shape) * np.finfo(float).eps)
 
     @cached_property
     def _reduced_cost(self) -> Float[np.ndarray, "z z"]:

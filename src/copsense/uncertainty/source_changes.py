@@ -1,7 +1,6 @@
 """What each source of uncertainty changes of a stance and of its limits, to first order.
 
-Every column is per unit of its source: one right-hand side of the system that solved the statics
-(theory2.md, section 7).
+Every column is per unit of its source: one right-hand side of the system that solved the statics.
 """
 
 from __future__ import annotations
