@@ -59,6 +59,10 @@ class RowSpace:
             null = vt[r:].T
         self.null = read_only(null.copy())
 
+    def __repr__(self) -> str:
+        """Its rank, and what it leaves free."""
+        return f"RowSpace(rank {self.rank}, {self.null.shape[1]} of {len(self.null)} free)"
+
     def least_solution(self, right: Float[np.ndarray, " k"]) -> Float[np.ndarray, " m"]:
         """The smallest x with A x = right; what A cannot reach is left out."""
         if self.apart:
