@@ -37,6 +37,7 @@ class ContactLayout:
         places: where each row stands among the contacts' wrenches, six numbers each (m,).
         edge_rows: rows of the soles' edges over the contacts' wrenches, in shares of the weight.
         edges: rows of each contact among them.
+        line_edges: those of the contacts whose sole is a line.
     """
 
     names: tuple[str, ...]
@@ -48,6 +49,7 @@ class ContactLayout:
     places: Int[np.ndarray, " m"]
     edge_rows: Float[np.ndarray, "e k"]
     edges: tuple[slice, ...]
+    line_edges: tuple[slice, ...]
 
 
 @lru_cache(maxsize=32)  # a path's stances share theirs
@@ -83,6 +85,7 @@ def lay_out(robot: Robot, contacts: tuple[Contact, ...]) -> ContactLayout:
     owner = np.repeat(np.arange(len(contacts)), np.diff(ends))
     edges = block_diag(*(contact.edge_rows for contact in contacts)) / robot.weight
     edge_ends = np.cumsum([0] + [len(contact.edge_rows) for contact in contacts])
+    of_contacts = _slices(edge_ends)
     return ContactLayout(
         names,
         tuple(contact.on(robot) for contact in contacts),
@@ -92,7 +95,8 @@ def lay_out(robot: Robot, contacts: tuple[Contact, ...]) -> ContactLayout:
         read_only(component),
         read_only(6 * owner + component),
         read_only(edges),
-        _slices(edge_ends),
+        of_contacts,
+        tuple(r for c, r in zip(contacts, of_contacts, strict=True) if c.sole and len(c.sole) == 2),
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_array
+from copsense.arrays import finite_array, read_only
 from copsense.contact import Plane
 from copsense.errors import InvalidInputError, UnknownNameError, UnloadedContactError
 from copsense.polygon import EdgeMargin, Polygon
@@ -15,6 +15,7 @@ from copsense.stance import Stance
 from copsense.statics import StaticEquilibrium
 
 LEAST_LOAD = 1e-3  # share of the weight: measured under less, a contact has no centre of pressure
+_SIGNS = read_only(np.array([-1.0, 1.0]))  # of (m_y, m_x)
 _LEVEL = 1e-6  # m, or 1 - cosine: how far contacts may be from one horizontal plane
 
 
@@ -43,7 +44,7 @@ def wrench_cops(
     normal = wrenches[..., 2:3]
     if loaded is not None:
         normal = np.where(loaded[..., None], normal, np.nan)
-    return np.asarray(wrenches[..., 4:2:-1] * (-1.0, 1.0) / normal)
+    return np.asarray(wrenches[..., 4:2:-1] * _SIGNS / normal)
 
 
 def load_shares(wrenches: Float[np.ndarray, "*n nc 6"]) -> Float[np.ndarray, "*n nc"]:

@@ -223,7 +223,7 @@ class CopSensitivity:
         ]
         return np.sqrt(self.equilibrium.stance.robot.mass) * np.array(speeds)
 
-    @cached_property
+    @property
     def com_travel(self) -> Float[np.ndarray, " nc"]:
         """How far the CoM may move before a contact tips, to first order of the slack [m].
 
@@ -238,7 +238,7 @@ class CopSensitivity:
         """
         return self._tipping[0]
 
-    @cached_property
+    @property
     def tipping_edge(self) -> Int[np.ndarray, " nc"]:
         """Index of the sole's edge that `com_travel` goes to (nc,); -1 where it goes to none.
 
@@ -267,16 +267,16 @@ class CopSensitivity:
         """
         stance, slack = self.equilibrium.stance, np.array(slacks)
         rate = stance.edge_rows.dot(self._wrench_gain.reshape(-1, 2))
-        for contact, rows in zip(stance.contacts, stance.edges, strict=True):
-            if contact.sole is not None and len(contact.sole) == 2:
-                # On the line, whatever side rounding puts it.
-                slack[rows][np.abs(slack[rows]) <= ON_EDGE] = 0.0
+        for rows in stance.line_edges:
+            slack[rows][np.abs(slack[rows]) <= ON_EDGE] = 0.0  # whatever side rounding puts it
         # An edge that stands still and is passed already leaves no way back.
         distance = np.where(slack < -ON_EDGE, -np.inf, np.inf)
         speed = np.hypot(rate[:, 0], rate[:, 1])
         np.divide(slack, speed, out=distance, where=speed > STILL)
         travel, edge = np.full(len(self.cop), np.inf), np.full(len(self.cop), -1)
-        held = np.abs(self.com_gain).max(axis=(1, 2), initial=0.0) < HELD
+        # Plain numbers: the four of a contact would take NumPy longer.
+        gains = self.com_gain.reshape(-1, 4).tolist()
+        held = [max(map(abs, gain)) < HELD for gain in gains]
         for k, rows in enumerate(stance.edges):
             if rows.stop > rows.start and held[k]:
                 # At a vertex that limits hold it meets all edges at once, where the load is gone.
@@ -441,8 +441,8 @@ def _sensitivity(
     wrench_derivative: np.ndarray,
     torque_derivative: np.ndarray,
 ) -> CopSensitivity:
-    p = contact_cops(equilibrium)
-    matrix = cop_rates(equilibrium, p, wrench_derivative)
+    p = read_only(contact_cops(equilibrium))
+    matrix = read_only(cop_rates(equilibrium, p, wrench_derivative))
     return CopSensitivity(equilibrium, basis, p, matrix, wrench_derivative, torque_derivative)
 
 

@@ -236,6 +236,11 @@ class Stance:
         """Rows of each contact in `edge_rows`, none where it has no sole."""
         return self._layout.edges
 
+    @property
+    def line_edges(self) -> tuple[slice, ...]:
+        """Those of the contacts whose sole is a line."""
+        return self._layout.line_edges
+
     @array_property
     def gravity(self) -> Float[np.ndarray, " nv"]:
         """Generalised gravity G(q) [N, Nm]."""
