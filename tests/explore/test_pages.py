@@ -53,6 +53,8 @@ def test_an_exported_page_draws_the_robot_and_requests_nothing(
         seen, right = colour_at(scene, view.com, inks.line)
         assert right, seen
         assert page.locator("table").inner_text().count("r_sole") == 2
+        scale = page.locator(".marks", has_text="Joints by torque under minimum-torque")
+        assert "linear-gradient" in scale.locator("span").get_attribute("style")
         assert "copsense analyse icub --com-y 0.03m" in page.locator("code").inner_text()
         outside = ("file:", "data:", "blob:", "about:")
         assert [u for u in page.requested if not u.startswith(outside)] == []

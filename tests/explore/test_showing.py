@@ -49,7 +49,7 @@ def test_an_analysis_shows_its_own_criteria_and_posture(icub):
     limits = copsense.Limits(friction=0.5)
     analysis = copsense.analyse(icub, [OWN], limits, com_y=0.02)
     said = words(analysis.show())
-    assert said.count("own") == 1 + len(icub.contacts)
+    assert said.count("own") == 2 + len(icub.contacts)  # the verdict, the scale, the table
     margin = analysis.to_dict()["criteria"]["own"]["contacts"]["r_sole"]["margin"]
     assert f"{1e3 * margin:.1f} to +y" in said
     assert "<code>" not in said  # no command makes this posture

@@ -13,8 +13,9 @@ import numpy as np
 from copsense._version import __version__
 from copsense.errors import InvalidInputError
 from copsense.explore.drawing import Colour, criterion_colours
-from copsense.explore.film import client_notices, film_html
+from copsense.explore.film import client_notices, coloured_by, film_html
 from copsense.explore.model import Model
+from copsense.explore.panel_html import torque_scale_html
 from copsense.explore.playback import frame_rows
 from copsense.explore.played_model import PlayedModel
 from copsense.explore.shape import Shape, load_shape
@@ -191,7 +192,7 @@ def _run_body(model: PlayedModel, rows: Sequence[int], views: Sequence[View]) ->
         )
         for what, (margin, contact, value) in least_margins(run, views).items()
     ]
-    marks = f'<p class="marks">{marks_words(run)}</p>'
+    marks = f'<p class="marks">{marks_words(run)}</p>{_scale(views[0])}'
     said = (
         f"{run.source}: {len(run)} postures, {run.axis} from {ends}, in {len(views)} frames. "
         "Play, scrub and speed are in the bar under the picture."
@@ -202,8 +203,15 @@ def _run_body(model: PlayedModel, rows: Sequence[int], views: Sequence[View]) ->
 def _view_body(view: View) -> Parts:
     colours = criterion_colours([each.name for each in view.criteria])
     notes = "".join(f"<li>{_text(note)}</li>" for note in view.notes)
-    below = _table(_HEADS, view.rows, colours) + f"<ul>{notes}</ul>" * bool(notes)
+    below = _table(_HEADS, view.rows, colours) + _scale(view) + f"<ul>{notes}</ul>" * bool(notes)
     return f"<p>{_text(view.verdict)}.</p>", below
+
+
+def _scale(view: View) -> str:
+    """What the joints' colours stand for."""
+    name = coloured_by(view)
+    words = torque_scale_html(name)
+    return f'<p class="marks">{words[0].upper()}{words[1:]}</p>' * bool(name)
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]], colours: dict[str, Colour]) -> str:

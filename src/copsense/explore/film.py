@@ -54,6 +54,11 @@ def film_html(
     return page[:end] + more + page[end:]
 
 
+def coloured_by(view: View) -> str:
+    """The criterion whose torques colour the joints of a film; empty where there is none."""
+    return view.criteria[-1].name if view.criteria else ""
+
+
 def client_notices() -> str:
     """Who wrote what viser's client holds: a page gives it on, and it says nothing of that."""
     return Path(__file__).with_name("notices.txt").read_text(encoding="utf-8")
@@ -69,8 +74,7 @@ def _recorded(  # type: ignore[no-untyped-def]  # viser's serializer
     server = GuardedServer()
     try:
         scene = Scene(server.viser, views[0], shape, light=True, dark=dark)
-        names = [each.name for each in views[0].criteria]
-        shown = Shown(torques=names[-1] if names else "", opacity=OPACITY)
+        shown = Shown(torques=coloured_by(views[0]), opacity=OPACITY)
         scene.show(views[0], shown)
         place_camera(server.viser, views[0], _NEAR, shape)
         recording = server.viser.get_scene_serializer()

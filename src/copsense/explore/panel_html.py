@@ -61,13 +61,21 @@ def table_html(view: View, colours: Mapping[str, Colour]) -> str:
         cells = "".join(f'<td style="{_CELL}">{_text(word)}</td>' for word in words)
         parts.append(f"<tr>{cells}</tr>")
     head = "".join(f'<td style="opacity:.6;padding:0 .3em 0 0">{word}</td>' for word in heads)
-    shades = ",".join(css(effort_colour(share)) for share in (0.0, 0.5, 1.0))
     return (
         '<div style="padding:0 .8em;overflow-x:auto"><table style="font-size:.72em;'
         f'border-spacing:0;width:100%"><tr>{head}</tr>{"".join(parts)}</table>'
-        '<div style="font-size:.68em;opacity:.7">lengths in mm; joints by torque, from none to its '
-        'limit (the largest, where the model has no limits): <span style="display:inline-block;'
-        f'width:5em;height:.7em;background:linear-gradient(90deg,{shades})"></span></div></div>'
+        f'<div style="font-size:.68em;opacity:.7">lengths in mm; {torque_scale_html()}</div></div>'
+    )
+
+
+def torque_scale_html(criterion: str = "") -> str:
+    """What the joints' colours stand for, and of which criterion if it is named."""
+    shades = ",".join(css(effort_colour(share)) for share in (0.0, 0.5, 1.0))
+    of = f" under {_text(criterion)}" * bool(criterion)
+    return (
+        f"joints by torque{of}, from none to its limit (the largest, where the model has no "
+        'limits): <span style="display:inline-block;width:5em;height:.7em;'
+        f'background:linear-gradient(90deg,{shades})"></span>'
     )
 
 
