@@ -19,14 +19,31 @@ from numba import njit, typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from copsense.path import COM_COORDINATES
+from copsense.polygon import ON_EDGE
+from copsense.posture import TOLERANCE
+from copsense.sensitivity import HELD, STILL
+from copsense.stance import AT_LIMIT, RANK_TOLERANCE
+
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 # Without a configuration of logging this goes to standard error: no one waits in silence.
 _LOG = logging.getLogger(__name__)
 
 # Numba would look at a function's own file alone, and call an older version of a function from
-# another one: machine code is of use while the text of the kernels does not change.
+# another one: machine code is of use while neither the text of the kernels nor what they take from
+# the reference changes.
+SHARED = {
+    "AT_LIMIT": AT_LIMIT,
+    "COM_COORDINATES": COM_COORDINATES,
+    "HELD": HELD,
+    "ON_EDGE": ON_EDGE,
+    "RANK_TOLERANCE": RANK_TOLERANCE,
+    "STILL": STILL,
+    "TOLERANCE": TOLERANCE,
+}
 _STAMP = hashlib.sha256(
     b"".join(file.read_bytes() for file in sorted(Path(__file__).parent.rglob("*.py")))
+    + repr(SHARED).encode()
 ).hexdigest()
 
 
