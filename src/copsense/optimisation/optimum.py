@@ -347,9 +347,10 @@ def _price(each: Binding, unit: str) -> str:
 
 
 def _proof(found: Optimum) -> list[str]:
-    starts = ", ".join("none" if math.isnan(v) else f"{v:.5g}" for v in found.starts)
+    shown_as = QUANTITIES[found.objective].shown
+    starts = ", ".join("none" if math.isnan(v) else shown_as(v) for v in found.starts)
     kept = "a local optimum" if found.converged else "not proven to be an optimum"
     return [
-        f"KKT residual {found.residual:.1e}: {kept}; {found.iterations} iterations; reached from "
-        f"{len(found.starts)} starts: {starts}"
+        f"KKT residual {found.residual:.1e}: {kept}; {found.iterations} iterations; the search "
+        f"reached from {len(found.starts)} starts: {starts}"
     ]
