@@ -119,6 +119,16 @@ def test_the_table_has_a_row_per_criterion_and_contact(analysis):
     np.testing.assert_array_equal(frame["cop_gain_y_y"].values[2:], found.com_gain[:, 1, 1])
 
 
+def test_the_dataset_is_the_table_over_criterion_and_contact(analysis, tmp_path):
+    found, frame = analysis.to_xarray(), analysis.to_pandas()
+    assert dict(found.sizes) == {"criterion": 2, "contact": 2}
+    for _, row in frame.iterrows():
+        here = found.sel(criterion=row["criterion"], contact=row["contact"])
+        assert here["com_travel"].item() == row["com_travel"]
+        assert here["margin_side"].item() == row["margin_side"]
+    found.to_netcdf(tmp_path / "analysis.nc")
+
+
 def test_it_draws_the_stance(analysis):
     titles = [axes.get_title(loc="left").split(":")[0] for axes in analysis.plot().axes]
     assert titles == ["from behind", "from its right", *analysis.sensitivities]

@@ -17,6 +17,7 @@ from copsense.arrays import finite_number
 from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
+from copsense.extras import require
 from copsense.freedom import com_span, freedom_notes
 from copsense.joint_notes import joint_limit_notes
 from copsense.json_data import json_data
@@ -35,6 +36,7 @@ from copsense.uncertainty import Spread, Uncertainty, propagate_uncertainty
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
     from copsense.explore.showing import ShownPage
     from copsense.plots.style import Figure
@@ -102,6 +104,15 @@ class Analysis:
         from copsense.analysis.analysis_table import table
 
         return table(self._data)
+
+    def to_xarray(self) -> xr.Dataset:
+        """The same table over criterion and contact, in SI units."""
+        require("xarray", "a dataset")
+        found = self.to_pandas().set_index(["criterion", "contact"]).to_xarray()
+        found = found.reindex(
+            criterion=list(self.sensitivities), contact=list(self.stance.contact_names)
+        )
+        return found.assign_attrs(robot=self.stance.robot.name, units="SI")
 
     def plot(self) -> Figure:
         """The robot, and each criterion from above, `copsense.plots.plot_stance`.
