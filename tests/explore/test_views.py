@@ -19,7 +19,7 @@ from copsense.scan import PathScan
 
 ROBOTS = ("icub", "talos", "g1", "solo12", "cassie", "four_bar")
 LIMITS = copsense.Limits(friction=0.6, torque="model")
-STATES = dict.fromkeys(ROBOTS, 25) | {"cassie": 8}  # some have no posture, which is said too
+STATES = dict.fromkeys(ROBOTS, 40) | {"cassie": 8}  # some have no posture, which is said too
 
 
 @pytest.fixture(scope="module")

@@ -166,6 +166,8 @@ def test_in_a_browser_a_run_is_played(browser, icub):
     ):
         where = "window.__viserMutable.nodeRefFromName['/com'].position.y"
         first, said = page.evaluate(where), page.locator("table").inner_text()
+        assert page.get_by_role("button", name="copy Python").count() == 1
+        assert page.get_by_role("button", name="copy command").count() == 0  # there is none
         page.get_by_label("play").check()
         page.wait_for_function(f"Math.abs({where} - {first}) > 0.01", timeout=30_000)
         page.get_by_label("play").uncheck()

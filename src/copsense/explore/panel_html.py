@@ -91,7 +91,7 @@ def asked_html(state: State, model: Model) -> str:
 
 
 def copy_html(model: Model, state: State, save: str) -> str:
-    """Buttons that copy the command and the Python of a state, and the command."""
+    """Buttons that copy the Python of a state and the command, where there is one; the command."""
     try:
         command, python = model.code(state)
     except InvalidInputError as error:
@@ -103,6 +103,7 @@ def copy_html(model: Model, state: State, save: str) -> str:
         ".then(() => {const was = this.innerText; this.innerText = 'copied';"
         f'setTimeout(() => this.innerText = was, 900)}})">{label}</button>'
         for label, text in (("copy command", command), ("copy Python", python))
+        if label == "copy Python" or not command.startswith("#")  # of a run's row none does
     )
     saved = f'<div style="font-size:.75em">{_text(save)}</div>' if save else ""
     return (
