@@ -18,16 +18,17 @@ import random
 import sys
 import tempfile
 import time
-import traceback
 import warnings
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
+from mutations import judged, report
 from support import log_files
 
 import copsense
@@ -187,17 +188,10 @@ def run(
             rng = random.Random(f"{name} {seed} {i}")
             path.write_bytes(mutated(files[name], rng))
             before, begun = {path, joints}, time.monotonic()
-            wrong = ""
+            attempt = partial(judge_command, path) if i % 8 == 7 else partial(judge, path, robot)
             with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
                 warnings.simplefilter("ignore")
-                try:
-                    wrong = judge_command(path) if i % 8 == 7 else judge(path, robot)
-                    counts["accepted"] += 1
-                except CopsenseError:
-                    counts["rejected"] += 1
-                except Exception as error:
-                    where = traceback.extract_tb(error.__traceback__)[-1]
-                    wrong = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+                wrong = judged(attempt, counts)
             (Path(folder) / "kept.toml").unlink(missing_ok=True)
             left = set(Path(folder).iterdir()) - before
             if left:
@@ -226,12 +220,7 @@ def main() -> int:
     for name in [given.only] if given.only else SHARES:
         share = 1.0 if given.only else SHARES[name]
         counts, bad = run(name, files, round(given.count * share), given.seed, robot)
-        print(
-            f"{name}: " + ", ".join(f"{n} {what}" for what, n in sorted(counts.items())), flush=True
-        )
-        for line in bad:
-            print(f"  {line}")
-        failed |= bool(bad)
+        failed |= report(name, counts, bad)
     return int(failed)
 
 

@@ -22,6 +22,7 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -263,6 +264,28 @@ def cases(kind: str) -> tuple[Callable[[random.Random], str], Callable[[str, Pat
     return lambda rng: mutate_text(base, rng), judges[kind]
 
 
+def judged(judge: Callable[[], str], counts: Counter[str]) -> str:
+    """What is wrong with an answer, empty if nothing is; counts what is accepted and rejected."""
+    try:
+        wrong = judge()
+        counts["accepted"] += 1
+    except CopsenseError:
+        counts["rejected"] += 1
+        wrong = ""
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        wrong = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+    return wrong
+
+
+def report(name: str, counts: Counter[str], bad: list[str]) -> bool:
+    """Print what a run found; whether something was wrong."""
+    print(f"{name}: " + ", ".join(f"{n} {what}" for what, n in sorted(counts.items())), flush=True)
+    for line in bad:
+        print(f"  {line}")
+    return bool(bad)
+
+
 def run(kind: str, count: int, seed: int) -> tuple[Counter[str], list[str]]:
     """Try many mutations of a kind.
 
@@ -279,15 +302,7 @@ def run(kind: str, count: int, seed: int) -> tuple[Counter[str], list[str]]:
             text = mutate(random.Random(f"{kind} {seed} {i}"))
             with warnings.catch_warnings(), contextlib.redirect_stderr(io.StringIO()):
                 warnings.simplefilter("ignore")
-                try:
-                    wrong = judge(text, folder)
-                    counts["accepted"] += 1
-                except CopsenseError:
-                    counts["rejected"] += 1
-                    continue
-                except Exception as error:
-                    where = traceback.extract_tb(error.__traceback__)[-1]
-                    wrong = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+                wrong = judged(partial(judge, text, folder), counts)
             if wrong:
                 counts["wrong"] += 1
                 bad.append(f"{kind} {seed} {i}: {wrong[:300]}")
@@ -308,12 +323,7 @@ def main() -> int:
     for kind in kinds:
         share = 1.0 if given.only else _SHARES[kind]
         counts, bad = run(kind, round(given.count * share), given.seed)
-        print(
-            f"{kind}: " + ", ".join(f"{n} {what}" for what, n in sorted(counts.items())), flush=True
-        )
-        for line in bad:
-            print(f"  {line}")
-        failed |= bool(bad)
+        failed |= report(kind, counts, bad)
     return int(failed)
 
 

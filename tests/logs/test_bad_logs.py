@@ -359,9 +359,12 @@ def test_files_cut_short_are_one_clear_error(whole_files, icub, tmp_path):
         assert rejected or name.endswith("csv"), name
 
 
-def test_damaged_files_are_rejected_in_words_or_read_as_far_as_they_go(whole_files, icub):
+def test_damaged_files_are_rejected_in_words_or_read_as_far_as_they_go(
+    whole_files, icub, monkeypatch
+):
     """A short run of benchmarks/log_mutations.py."""
     path = Path(__file__).parents[2] / "benchmarks" / "log_mutations.py"
+    monkeypatch.syspath_prepend(path.parent)
     spec = importlib.util.spec_from_file_location("log_mutations", path)
     mutations = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(mutations)
