@@ -33,6 +33,16 @@ def least_torque(icub):
     return optimise(icub, objective="torque", over=COM, within=KNEES, starts=1)
 
 
+def test_weights_alone_are_what_design_chooses(icub):
+    found = optimise(icub, family="length", over={}, objective="sideways", starts=1)
+    path = copsense.lateral_sweep(icub, -0.09, 0.09, 19)
+    designed = copsense.design_criterion(path, Limits(), "length", grid=5)
+    assert np.array_equal(found.stance.q, icub.q)
+    assert not found.after.coordinates
+    assert found.after.parameters == pytest.approx(designed.score.parameters, rel=1e-4)
+    assert found.after.sideways_travel == pytest.approx(designed.score.travel, rel=1e-6)
+
+
 def positions(stance, names):
     return np.array([stance.robot.joint_position(stance.q, name) for name in names])
 

@@ -58,7 +58,8 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
     metavar="NAME[=LOW:HIGH]",
     help="A coordinate that may vary, and its range: as --at names them (degrees, metres, or with "
     "units), or com, turn (of the base), joints (off the limbs in contact) or feet; =+-WIDTH to "
-    "either side of where it is. Repeatable; default com and turn. Limbs in contact follow.",
+    "either side of where it is. Repeatable; default com and turn. Limbs in contact follow. none, "
+    "with --family: the criterion's weights alone, as in copsense design.",
 )
 @click.option(
     "--within",
@@ -232,12 +233,18 @@ def optimise(
 def read_over(
     texts: Sequence[str], stance: Stance
 ) -> dict[str, tuple[float, float] | float | None]:
-    """``NAME``, ``NAME=LOW:HIGH`` and ``NAME=+-WIDTH`` options, in SI.
+    """``NAME``, ``NAME=LOW:HIGH`` and ``NAME=+-WIDTH`` options, in SI; ``none`` for nothing.
 
     Raises:
         UnknownNameError: no such coordinate.
-        InvalidInputError: a range that is not understood, or a name twice.
+        InvalidInputError: a range that is not understood, a name twice, or ``none`` beside another.
     """
+    if "none" in texts:
+        if len(texts) > 1:
+            raise InvalidInputError(
+                "none is given beside a coordinate that varies. Drop one of them."
+            )
+        return {}
     found: dict[str, tuple[float, float] | float | None] = {}
     for text in texts:
         name, equals, span = text.partition("=")

@@ -70,7 +70,7 @@ def optimise(
             [m, rad], or how far to either side, or None for the usual range. ``"com"``, ``"turn"``
             (of the base), ``"joints"`` (off the limbs in contact) and ``"feet"`` stand for several.
             Default ``com`` and ``turn``. What is not named keeps the stance's value; the limbs in
-            contact follow.
+            contact follow. Empty, with a family: the posture stays, as in `design_criterion`.
         within: coordinate or joint that need not be named -> where it must stay [m, rad].
         reserve: part of the joints' names -> how far inside their limits they must stay [rad, or
             m], such as ``{"knee": 0.035}``; or one number for all.

@@ -85,9 +85,10 @@ def asked(
     check_limits(limits)
     chosen = None if family is None else family_named(stance, family)
     ranges = usual_coordinates(stance) if over is None else expand(stance, over)
-    if not ranges:
+    if not ranges and family is None:
         raise InvalidInputError(
-            "no coordinate may vary, so there is nothing to optimise. Name one, such as com_z."
+            "no coordinate may vary, so there is nothing to optimise. Name one, such as com_z, or "
+            "give a family of criteria, whose weights vary."
         )
     kept, spare = expand(stance, within or {}), reserves_of(stance, reserve)
     variables, rest = variables_of(stance, ranges, kept, spare, chosen)

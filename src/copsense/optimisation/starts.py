@@ -31,7 +31,11 @@ def starts_of(program: PostureProgram, count: int, seed: int) -> list[Float[np.n
     own = variables.at(plan.given, np.exp(middle))
     if count < 2:
         return [own]
-    looked = sorted(_sample(program, seed), key=lambda pair: -pair[0])
+    if plan.names:
+        looked = sorted(_sample(program, seed), key=lambda pair: -pair[0])
+    else:  # the posture stays
+        tried = weights_tried(variables, own)
+        looked = sorted(((_least(program, x), x) for x in tried), key=lambda pair: -pair[0])
     better = [x for _, x in looked[: max(len(looked) // 2, count)]]
     found = [own]
     while better and len(found) < count:  # the one that is farthest from those that are taken
@@ -88,8 +92,12 @@ def _sample(program: PostureProgram, seed: int) -> list[tuple[float, np.ndarray]
         given[plan.place] = asked[row]
         _unwind(given, plan.given, program.stance.robot.base_nv)
         x = variables.at(given, np.exp(drawn[row, k:]))
-        kept.append((float(program.at(x).rows.min()), x))
+        kept.append((_least(program, x), x))
     return kept
+
+
+def _least(program: PostureProgram, x: Float[np.ndarray, " k"]) -> float:
+    return float(program.at(x).rows.min())
 
 
 def _unwind(given: np.ndarray, own: np.ndarray, base_nv: int) -> None:

@@ -238,7 +238,7 @@ def variables_of(
         if name in COM_COORDINATES and (held := com_held(stance, COM_COORDINATES.index(name))):
             raise InvalidInputError(held)
     plan = chart_coordinates(stance, tuple(ranges))
-    moved = {u for limb in plan.limbs for u in limb.unknowns}
+    moved = {u for limb in plan.limbs for u in limb.unknowns if ranges}
     index = np.array(sorted({int(p) for p in plan.place} | moved), dtype=int)
     labels, units = _labels(stance)
     low, high = np.full(len(plan.given), -np.inf), np.full(len(plan.given), np.inf)

@@ -317,7 +317,7 @@ def test_one_foot_takes_the_reference(case):
     [
         (["com_q"], "com_x"),
         (["com_x", "com_x"], "distinct"),
-        ([], "distinct"),
+        ([], "one coordinate at least"),
         ("com_x", "single name"),
         (["com_y", "base_y"], "decides the other"),
         (["l_sole:z"], "l_sole:x"),

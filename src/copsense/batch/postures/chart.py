@@ -98,6 +98,8 @@ class PostureChart:
             InvalidInputError: no name, one twice, or two that contradict each other.
             UnknownNameError: a name that is not a coordinate.
         """
+        if not len(coordinates):
+            raise InvalidInputError("a chart needs one coordinate at least, got none. Name one.")
         self.stance = stance
         self._coordinates = chart_coordinates(stance, coordinates)
         self.names, self.units = self._coordinates.names, self._coordinates.units

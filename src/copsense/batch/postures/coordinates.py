@@ -103,7 +103,7 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
     """Find out what some names mean.
 
     Raises:
-        InvalidInputError: no name, one twice, or two that contradict each other.
+        InvalidInputError: a name twice, or two that contradict each other.
         UnknownNameError: a name that is not a coordinate.
     """
     if isinstance(names, str):
@@ -113,10 +113,9 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
     for name in names:
         if name not in valid:
             raise UnknownNameError(f"coordinate of robot {stance.robot.name!r}", name, valid)
-    if not names or len(set(names)) != len(names):
+    if len(set(names)) != len(names):
         raise InvalidInputError(
-            f"a chart needs distinct coordinates, got {', '.join(names) or 'none'}. "
-            "Name each of them once, and at least one."
+            f"a chart needs distinct coordinates, got {', '.join(names)}. Name each of them once."
         )
     for axis in "xyz":
         if {f"com_{axis}", f"base_{axis}"} <= set(names):
