@@ -105,8 +105,10 @@ class PostureProgram:
         self._distance = distance
         self._standing = objective.sign < 0 and bool(gauge.names(_MARGIN))
         plan = variables.plan
-        self.equal_names: tuple[str, ...] = tuple(
-            f"{name} in place" for name, _ in row_units(stance, plan)
+        loops = stance.closures.names if stance.closures else ()
+        self.equal_names: tuple[str, ...] = (
+            *(f"{name} in place" for name, _ in row_units(stance, plan)),
+            *(f"{name} closed" for name in loops),
         )
         self.row_names: tuple[str, ...] = gauge.names(objective)
         names = [f"limit: {n}" for n in gauge.names(_MARGIN)] if self._standing else []
@@ -198,6 +200,8 @@ class PostureProgram:
         given = self.variables.given(x)
         here = self._at(given)
         errors, _ = constraint_errors(here, self.variables.plan, given)
+        if here.closures is not None:
+            errors = np.concatenate([errors, here.closures.error])
         try:
             found = solve_equilibrium(here, self.criterion(x))
             rows = self.objective.sign * self.scale * self.gauge.rows(self.objective, found)

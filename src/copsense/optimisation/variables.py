@@ -24,7 +24,6 @@ from copsense.batch.postures.coordinates import (
     chart_coordinates,
     coordinate_names,
     joint_units,
-    solved_whole,
 )
 from copsense.content import ShortRepr
 from copsense.design import Family
@@ -229,16 +228,20 @@ def variables_of(
         InvalidInputError: constraints that contradict each other, or a robot that is not covered.
     """
     robot = stance.robot
-    if solved_whole(stance):
+    if stance.hanging_motions.shape[1]:
         raise InvalidInputError(
-            f"robot {robot.name!r} has loops, couplings or hanging joints, which tie base and "
-            "limbs together: it cannot be optimised yet. Look for postures with copsense map."
+            f"robot {robot.name!r} has joints that hang, or springs that settle, at an equilibrium "
+            "of their own: it cannot be optimised. Lock or couple them (--lock, --couple), or look "
+            "for postures with copsense map."
         )
     for name in ranges:
         if name in COM_COORDINATES and (held := com_held(stance, COM_COORDINATES.index(name))):
             raise InvalidInputError(held)
     plan = chart_coordinates(stance, tuple(ranges))
     moved = {u for limb in plan.limbs for u in limb.unknowns if ranges}
+    closing = _closing(stance, moved | {int(p) for p in plan.place})
+    if closing:  # loops and couplings tie base and limbs together
+        moved |= {*range(robot.base_nv), *closing}
     index = np.array(sorted({int(p) for p in plan.place} | moved), dtype=int)
     labels, units = _labels(stance)
     low, high = np.full(len(plan.given), -np.inf), np.full(len(plan.given), np.inf)
@@ -302,6 +305,17 @@ def variables_of(
         ),
         family,
     ), rest
+
+
+def _closing(stance: Stance, moved: set[int]) -> set[int]:
+    """Velocities that move along with some others, for loops and couplings to stay closed."""
+    if stance.closures is None:
+        return set()
+    tied = [set(np.flatnonzero(row).tolist()) for row in stance.closures.jacobian]
+    found: set[int] = set()
+    while more := {v for row in tied if row & (moved | found) for v in row} - found:
+        found |= more
+    return found
 
 
 def _labels(stance: Stance) -> tuple[list[str], list[Unit]]:
