@@ -8,7 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import pytest
+
+from copsense import cli
+from copsense.cli.option_lists import SECTIONS
 
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
@@ -49,6 +53,22 @@ def test_help_of_every_command_shows_an_example_and_loads_no_robot_and_no_plots(
     for name, text in texts.items():
         assert re.search(rf"Examples?: copsense {name}", " ".join(text.split())), name
     assert list(texts) == list(importlib.import_module("copsense.cli").copsense.places)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_lists_every_option_once_a_command_s_own_first(name):
+    command = cli.copsense.get_command(click.Context(cli.copsense), name)
+    text = command.get_help(click.Context(command, info_name=name))
+    heads = re.findall(r"^([A-Z][\w ]+):$", text, re.MULTILINE)
+    assert heads[0] == "Options"
+    assert heads[1:] == [section for section in SECTIONS if section in heads]
+    listed = re.findall(r"^  (?:-\w, )?(--[\w-]+)", text, re.MULTILINE)
+    known = [p.opts[-1] for p in command.params if isinstance(p, click.Option)]
+    assert sorted(listed) == sorted([*known, "--help"])
+    if name == "analyse":
+        assert heads[1:] == list(SECTIONS)
+        assert "--along" in text.partition("Posture:")[0]
+        assert "--sole" in text.partition("Contacts and ground:")[2].partition("Joints")[0]
 
 
 def test_the_group_lists_every_command_without_importing_it():

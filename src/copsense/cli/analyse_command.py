@@ -9,6 +9,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.region_text import region_lines, save_regions
 from copsense.cli.stance_options import read_stance, stance_options
@@ -18,6 +19,7 @@ from copsense.errors import InvalidInputError
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense analyse icub --com-y 0.03 --along l_hip_roll --plot icub.png\n"
     "  copsense analyse icub --com-y 30mm --joint l_knee=-20 --json\n"
@@ -26,7 +28,7 @@ from copsense.errors import InvalidInputError
     "  copsense analyse icub --at com_y=30mm --at pitch=2deg --at l_sole:x=20mm\n"
     "  copsense analyse icub --load l_hand=0:0:-20 --spring-load r_hand=500:0:500:0.2:-0.3:0.6\n"
     "  copsense analyse icub --com-y 0.03 --payload l_hand=2 --save-stance carrying.toml\n"
-    "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png"
+    "  copsense analyse icub --limits friction=0.33,torque=model --regions regions.png",
 )
 @stance_options
 @criterion_options

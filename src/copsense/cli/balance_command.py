@@ -28,6 +28,7 @@ from copsense.cli.disturbance_options import (
     read_signal,
 )
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import (
     PICTURES,
     echo_json,
@@ -47,11 +48,12 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense balance icub --reference sine:0.03:0.1 --output icub.nc --plot icub.png\n"
     "  copsense balance icub --reference sine:20mm:0.5 --export icub.html\n"
     "  copsense balance icub --push 0:40:0:0.5:0.1 --gain com-stiffness=100 --gain com-damping=20\n"
-    "  copsense balance icub --controller my_balance:Balance --video icub.mp4"
+    "  copsense balance icub --controller my_balance:Balance --video icub.mp4",
 )
 @stance_options
 @one_criterion_options

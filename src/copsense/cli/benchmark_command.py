@@ -15,7 +15,7 @@ import click
 from copsense.cli.controller_options import control_period_option
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
-from copsense.cli.option_lists import F
+from copsense.cli.option_lists import F, SectionedCommand
 from copsense.cli.place_options import place_options
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.robot_argument import robot_argument
@@ -51,13 +51,14 @@ def _standing_options(command: F) -> F:
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense benchmark --output table.csv --plot table.png\n"
     "  copsense benchmark icub talos --posture own --disturbance lean --jobs 2\n"
     "  copsense benchmark icub --limits friction=0.8,cop-margin=0.001 --disturbance falls\n"
     "  copsense benchmark icub --com-y 0.01 --payload l_hand=1 --disturbance lean\n"
     "  copsense benchmark --stance carrying.toml --disturbance push\n"
-    "  copsense benchmark --plan plan.toml --output table.csv"
+    "  copsense benchmark --plan plan.toml --output table.csv",
 )
 @robot_argument("robots", nargs=-1, metavar="[ROBOT]...")
 @click.option("--plan", "plan_file", type=click.Path(), help="Take the cases from a TOML file.")

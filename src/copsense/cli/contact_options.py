@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import CONTACTS, F, with_options
 from copsense.cli.units import LENGTH, Unit, read_numbers, read_quantity, split_assignment
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -118,7 +118,7 @@ def contact_options(command: F) -> F:
             "world axes, such as a wall: l_hand=-1:0:0:0.4:0:0. Repeatable.",
         ),
     ]
-    return with_options(options, command)
+    return with_options(options, command, CONTACTS)
 
 
 def read_contacts(

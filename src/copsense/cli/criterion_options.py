@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import SHARING, F, with_options
 from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import LENGTH
 from copsense.errors import InvalidInputError
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 def criterion_options(command: F) -> F:
     """Which criteria share the load: any number of them."""
-    return with_options(_options("Repeatable; default the first two."), command)
+    return with_options(_options("Repeatable; default the first two."), command, SHARING)
 
 
 def one_criterion_options(command: F) -> F:
     """Which criterion shares the load: one."""
-    return with_options(_options("One; default minimum-torque."), command)
+    return with_options(_options("One; default minimum-torque."), command, SHARING)
 
 
 def _options(how_many: str) -> list[Callable[[Any], Any]]:

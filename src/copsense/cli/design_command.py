@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.place_options import read_course
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, swept_stance_options
@@ -20,9 +21,10 @@ _USUAL = "-0.09:0.09:37"  # of --com-y
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense design icub --family length --com-y -0.08:0.08:17\n"
-    "  copsense design icub --family joints --limits friction=0.33,torque=model --plot design.png"
+    "  copsense design icub --family joints --limits friction=0.33,torque=model --plot design.png",
 )
 @swept_stance_options
 @click.option(

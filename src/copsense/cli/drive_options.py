@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from copsense.cli.load_options import read_frame
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import DRIVES, F, with_options
 from copsense.cli.units import Unit, read_numbers, read_quantity, split_assignment
 from copsense.errors import InvalidInputError, UnknownNameError
 
@@ -94,7 +94,7 @@ def drive_options(command: F) -> F:
             help="A joint that is rigid, at zero. Repeatable.",
         ),
     ]
-    return with_options(options, command)
+    return with_options(options, command, DRIVES)
 
 
 def read_drives(

@@ -10,6 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import echo_json, echo_written, progress_bar
 from copsense.cli.stance_memory import remembered_stance, written
 from copsense.cli.stance_options import read_stance, stance_options, standing_options
@@ -20,12 +21,13 @@ _NOT_WHERE_IT_STANDS = ("limits", "save_stance", "force_stance")  # of `standing
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense explore icub\n"
     "  copsense explore my.urdf --contact l_foot --contact r_foot --contact-at sole\n"
     "  copsense explore talos --com-y 30mm --limits friction=0.5,torque=model\n"
     "  copsense explore icub --com-y 30mm --export icub.html\n"
-    "  copsense explore icub --recording run.nc"
+    "  copsense explore icub --recording run.nc",
 )
 @stance_options
 @criterion_options

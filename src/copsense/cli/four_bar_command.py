@@ -16,8 +16,10 @@ MASS = Quantity("kg")
 
 @click.command(
     "four-bar",
-    epilog="Example: copsense four-bar --leg-length 0.5 --rod-length 0.14 --leg-mass 8.25 "
-    "--body-mass 16.5 --xi 86deg --criterion minimum-torque --json",
+    epilog="\b\nExamples:\n"
+    "  copsense four-bar --xi 86deg\n"
+    "  copsense four-bar --leg-length 0.5 --rod-length 0.14 --leg-mass 8.25 --body-mass 16.5 "
+    "--xi 86deg --criterion minimum-torque --json",
 )
 @click.option(
     "--leg-length", type=LENGTH, default=0.5, show_default=True, metavar="LENGTH", help="l [m]."

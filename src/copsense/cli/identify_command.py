@@ -11,14 +11,16 @@ from copsense.cli.log_options import (
     read_shown,
     read_subject,
 )
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import echo_json, echo_notes, progress_bar
 from copsense.cli.units import read_quantity
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense identify com-sinusoid.mat --robot icub.urdf --family joints\n"
-    "  copsense identify sway.nc --robot icub --family length --family mix --json"
+    "  copsense identify sway.nc --robot icub --family length --family mix --json",
 )
 @log_options
 @click.option(

@@ -8,7 +8,7 @@ import click
 
 from copsense.cli.contact_options import contact_options, possible_frames, read_contacts
 from copsense.cli.drive_options import drive_options, read_drives
-from copsense.cli.option_lists import package_dirs_option
+from copsense.cli.option_lists import SectionedCommand, package_dirs_option
 from copsense.cli.printing import echo_json
 from copsense.cli.robot_argument import robot_argument
 from copsense.cli.stance_options import place_at_height
@@ -16,11 +16,12 @@ from copsense.errors import InvalidInputError
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense inspect robot.urdf\n"
     "  copsense inspect robot.urdf --package-dir ~/ros/share --json\n"
     "  copsense inspect robot.urdf --passive l_ankle --loop l_rod_end=l_heel\n"
-    "  copsense inspect robot.urdf --contact l_toe:point --contact r_toe:point"
+    "  copsense inspect robot.urdf --contact l_toe:point --contact r_toe:point",
 )
 @robot_argument()
 @package_dirs_option

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.option_lists import F
+from copsense.cli.option_lists import SHARING, F, with_options
 from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -32,14 +32,15 @@ _EXAMPLES = {
 
 def limits_option(command: F) -> F:
     """The option itself, to decorate a command with."""
-    return click.option(
+    option = click.option(
         "--limits",
         metavar="NAME=VALUE,...",
         help="Inequalities that the wrenches must respect, solved as a QP: normal-force [N], "
         "friction, sides, cop-margin [m], torsion [m, or cone], torque [N m, or model]. "
         "Those not named keep their default (normal-force=0, cop-margin=0, contacts' own "
         "friction); off switches one off. Example: friction=0.33,torque=model.",
-    )(command)
+    )
+    return with_options([option], command, SHARING)
 
 
 def read_limits(text: str | None) -> Limits | None:

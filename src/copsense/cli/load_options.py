@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import LOADS, F, with_options
 from copsense.cli.units import Unit, read_numbers, read_quantity, split_assignment
 from copsense.errors import InvalidInputError
 
@@ -61,7 +61,7 @@ def load_options(command: F) -> F:
             f"those of both. {_AT}",
         ),
     ]
-    return with_options(options, command)
+    return with_options(options, command, LOADS)
 
 
 def put_loads(

@@ -16,6 +16,7 @@ from copsense.cli.log_options import (
     read_shown,
     read_subject,
 )
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.units import read_quantity
 from copsense.errors import CopsenseError, InvalidInputError
@@ -26,12 +27,13 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense log com-sinusoid.mat --robot icub.urdf --plot log.png\n"
     "  copsense log com-sinusoid.mat --robot icub.urdf --report swaying\n"
     "  copsense log walk.mcap --robot g1 --map g1.toml --contact left_ankle_roll_link "
     "--contact right_ankle_roll_link --json\n"
-    "  copsense log run.csv --robot icub --save-map run.toml"
+    "  copsense log run.csv --robot icub --save-map run.toml",
 )
 @log_options
 @click.option(

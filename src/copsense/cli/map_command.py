@@ -10,6 +10,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.place_options import reject_varied
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar, waiting
 from copsense.cli.stance_options import read_stance, stance_options
@@ -25,8 +26,14 @@ if TYPE_CHECKING:
 
 @click.command(
     "map",
-    epilog="Example: copsense map icub --over com_y=-0.05:0.05:101 --over com_z=0.47:0.5:61 "
-    "--output icub.zarr --plot icub.png. The same command resumes a map that was stopped.",
+    cls=SectionedCommand,
+    epilog="\b\nExamples:\n"
+    "  copsense map icub --over com_y=-50mm:50mm:101 --over com_z=0.47:0.5:61 "
+    "--output icub.zarr --plot icub.png\n"
+    "  copsense map icub --over com_y=-50mm:50mm --over pitch=-5:5 --samples 4096 "
+    "--output sample.zarr\n"
+    "  copsense map icub --over com_y=-50mm:50mm:101 --limits friction=0.33 --local 2 "
+    "--output within.zarr",
 )
 @stance_options
 @criterion_options
@@ -108,8 +115,9 @@ def map_command(
     """Map the sensitivity of ROBOT over a space of postures, contacts in place.
 
     ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Evaluates a grid or
-    a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it). A posture that cannot be
-    reached or evaluated is a row with its reason, and makes the exit code 1.
+    a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it); the same command resumes
+    a map that was stopped. A posture that cannot be reached or evaluated is a row with its reason,
+    and makes the exit code 1.
     """
     require("zarr", "a map's store")  # its extra brings what else a map needs
 

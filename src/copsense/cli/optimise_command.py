@@ -9,6 +9,7 @@ import click
 
 from copsense.cli.criterion_options import one_criterion_options, read_criterion
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_memory import remembered_stance, written
 from copsense.cli.stance_options import read_stance, stance_options
@@ -33,13 +34,14 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense optimise icub --reserve knee=2deg --plot before_after.png\n"
     "  copsense optimise icub --over com --export before_after.html\n"
     "  copsense optimise icub --over com --over turn --over feet=+-30mm --save-stance wide.toml\n"
     "  copsense optimise icub --objective torque --require travel=45mm --within l_knee=-90:-5\n"
     "  copsense optimise icub --over com --pareto torque --points 5 --plot front.png\n"
-    "  copsense optimise icub --over com --family joints --limits friction=0.33,torque=model"
+    "  copsense optimise icub --over com --family joints --limits friction=0.33,torque=model",
 )
 @stance_options
 @one_criterion_options

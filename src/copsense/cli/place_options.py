@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from copsense.cli.option_lists import F, with_options
+from copsense.cli.option_lists import POSTURE, F, with_options
 from copsense.cli.units import (
     LENGTH,
     read_coordinates,
@@ -68,7 +68,7 @@ def place_options(command: F, *, coordinates: bool = True) -> F:
         ),
         *([_AT] if coordinates else []),
     ]
-    return with_options(options, command)
+    return with_options(options, command, POSTURE)
 
 
 def course_options(command: F) -> F:
@@ -94,7 +94,7 @@ def course_options(command: F) -> F:
         ),
         _AT,
     ]
-    return with_options(options, command)
+    return with_options(options, command, POSTURE)
 
 
 @dataclass(frozen=True)

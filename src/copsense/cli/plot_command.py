@@ -7,13 +7,15 @@ from pathlib import Path
 import click
 
 from copsense.cli.limit_options import limits_option, read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_written
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense plot icub.nc --output icub.png\n"
-    "  copsense plot icub.nc --limits friction=0.3,torque=model"
+    "  copsense plot icub.nc --limits friction=0.3,torque=model",
 )
 @click.argument("file", type=click.Path())
 @click.option(

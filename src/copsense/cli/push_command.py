@@ -10,16 +10,18 @@ import click
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.load_options import read_point
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.stance_options import read_stance, stance_options
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense push icub --plot push.png\n"
     "  copsense push icub --at l_hand --limits friction=0.6,torque=model --json\n"
     "  copsense push icub --com-y 0.03 --joint torso_pitch=10 --payload l_hand=2\n"
-    "  copsense push talos --at torso_2_link --point 0:0:0.2"
+    "  copsense push talos --at torso_2_link --point 0:0:0.2",
 )
 @partial(stance_options, coordinates=False)  # --at is the frame that is pushed
 @criterion_options

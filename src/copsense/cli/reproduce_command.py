@@ -9,13 +9,15 @@ import sys
 import click
 
 from copsense.cli.limit_options import limits_option, read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.errors import InvalidInputError
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense reproduce --output reproduction\n"
-    "  copsense reproduce --log com-sinusoid.mat --log-robot model.urdf"
+    "  copsense reproduce --log com-sinusoid.mat --log-robot model.urdf",
 )
 @click.option(
     "--output",

@@ -12,7 +12,7 @@ from copsense.cli.contact_options import contact_options, possible_frames, read_
 from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
-from copsense.cli.option_lists import F, package_dirs_option, with_options
+from copsense.cli.option_lists import POSTURE, STANCE_FILE, F, package_dirs_option, with_options
 from copsense.cli.place_options import course_options, place_options, put_in_place
 from copsense.cli.printing import echo_notes
 from copsense.cli.robot_argument import robot_argument
@@ -56,7 +56,7 @@ def standing_options(command: F, posture: Callable[[Any], Any] | None = None) ->
         command: to be decorated.
         posture: the command's own ``--posture``.
     """
-    options = [
+    files = [
         click.option(
             "--stance",
             "stance_file",
@@ -74,8 +74,8 @@ def standing_options(command: F, posture: Callable[[Any], Any] | None = None) ->
             "copsense.load_stance.",
         ),
         click.option("--force-stance", is_flag=True, help="Overwrite that file."),
-        contact_options,
-        package_dirs_option,
+    ]
+    standing = [
         posture or _POSTURE,
         click.option(
             "--base-yaw",
@@ -93,11 +93,15 @@ def standing_options(command: F, posture: Callable[[Any], Any] | None = None) ->
         click.option(
             "--width", type=LENGTH, metavar="LENGTH", help="Distance between two feet [m]."
         ),
-        drive_options,
-        load_options,
-        limits_option,
     ]
-    return with_options(options, command)
+    for options, section in (
+        ([drive_options, load_options, limits_option], None),
+        (standing, POSTURE),
+        ([contact_options, package_dirs_option], None),
+        (files, STANCE_FILE),
+    ):
+        command = with_options(options, command, section)
+    return command
 
 
 def read_stance(

@@ -11,6 +11,7 @@ import click
 
 from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.place_options import Course, read_course
 from copsense.cli.printing import echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, swept_stance_options
@@ -23,11 +24,12 @@ if TYPE_CHECKING:
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense sweep icub --com-y -0.07:0.07:201 --output icub.nc\n"
     "  copsense sweep icub --com-y -30mm:30mm:61 --period 2s --output sway.nc\n"
     "  copsense sweep icub --com-y -0.05:0.05:51 --com-x 0.01 --joint torso_yaw=20\n"
-    "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv"
+    "  copsense sweep icub --joint l_knee=-30:-5:11 --criterion minimum-torque --output knee.csv",
 )
 @swept_stance_options
 @criterion_options
