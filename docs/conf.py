@@ -14,9 +14,11 @@ from docutils.utils.math.latex2mathml import tex2mathml
 from sphinx.application import Sphinx
 from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
+from sphinx_gallery.sorting import ExplicitOrder
 
 os.environ["MPLBACKEND"] = "agg"
-standard_logging.getLogger("websockets").setLevel("WARNING")  # of pages in 3-D
+for noisy in ("websockets", "OpenGL.acceleratesupport"):  # of pages in 3-D, and of MuJoCo
+    standard_logging.getLogger(noisy).setLevel("WARNING")
 
 logger = logging.getLogger(__name__)
 
@@ -90,6 +92,9 @@ sphinx_gallery_conf = {
     # Every example runs at every build.
     "filename_pattern": r"\.py$",
     "run_stale_examples": True,
+    "subsection_order": ExplicitOrder(
+        [f"../examples/{folder}" for folder in ("share", "stand", "limits", "many", "time")]
+    ),
     "within_subsection_order": "FileNameSortKey",
     "remove_config_comments": True,
     "download_all_examples": False,

@@ -3,7 +3,6 @@
 import ast
 import pkgutil
 import re
-import runpy
 import shlex
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from support.commands import copsense
 from support.fences import blocks, commands
 
 ROOT = Path(__file__).parents[1]
-EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
 
 
 def test_every_class_says_what_it_is():
@@ -28,9 +27,12 @@ def test_every_class_says_what_it_is():
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
-def test_example_runs_and_its_numbers_hold(example):
-    assert "assert" in example.read_text("utf-8"), "an example asserts a number"
-    runpy.run_path(str(example))
+def test_an_example_asserts_a_number_and_draws(example):
+    # `make docs` runs each, and fails where an assertion does: once is enough.
+    code = ast.parse(example.read_text("utf-8"))
+    assert any(isinstance(node, ast.Assert) for node in code.body)
+    drawn = [name.id for node in code.body for name in ast.walk(node) if isinstance(name, ast.Name)]
+    assert "figure" in drawn or "show" in example.read_text("utf-8")
 
 
 @pytest.mark.parametrize(

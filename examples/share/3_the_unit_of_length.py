@@ -8,6 +8,7 @@ both are closed forms, here beside the general solver.
 """
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import copsense
 from copsense.paper import FourBar, solve_four_bar
@@ -37,3 +38,19 @@ for length in (1.0, 0.3, 0.07):
 torque = solve_four_bar(linkage, xi, "minimum-torque")
 print(f"minimum torque: CoP {torque.cop * 1e3} mm")
 assert np.allclose(torque.cop, closed.cop, rtol=1e-12)
+
+# %%
+# In between, the slope goes from one to the other.
+
+lengths = np.geomspace(0.02, 2.0, 50)
+slopes = [
+    solve_four_bar(linkage, xi, "minimum-wrench", characteristic_length=length).cop_per_com
+    for length in lengths
+]
+figure = Figure(figsize=(6, 3.6), layout="constrained")
+axes = figure.add_subplot()
+axes.semilogx(lengths, slopes, label=["left foot", "right foot"])
+axes.axvline(0.07, linestyle=":", color="0.4", label="minimum torque")
+axes.set_xlabel("L [m]")
+axes.set_ylabel("dCoP/dCoM")
+axes.legend()
