@@ -185,6 +185,9 @@ def test_a_file_of_another_robot_or_of_none_is_rejected(icub, swept, tmp_path):
         load_run(swept, icub)
     with pytest.raises(InvalidInputError, match="missing"):
         load_run(tmp_path / "missing.nc", icub)
+    for name in ("missing.csv", "\0", "x" * 400):
+        with pytest.raises(InvalidInputError, match=r"no file at .* a sweep .* own log"):
+            load_run(name, icub)
     with pytest.raises(InvalidInputError, match="a mapping is of a robot's log"):
         load_run(swept, icub, "map.toml")
     sweep = copsense.Sweep.load(swept)

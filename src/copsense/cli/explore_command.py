@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 import sys
 from pathlib import Path
 from typing import Any
@@ -202,7 +203,9 @@ def _serve(
             click.echo("Ctrl-C ends it.", err=True)
         if host not in ("127.0.0.1", "localhost", "::1"):
             click.echo(
-                f"note: {host} can be reached from the network; who knows the address can connect.",
+                f"note: {host} can be reached from the network; who knows the address can connect. "
+                f"From another machine put this one's name or address ({socket.gethostname()}) in "
+                "place of the address's own.",
                 err=True,
             )
         sys.stdout.flush()

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from copsense.description import is_folder
 from copsense.errors import InvalidInputError
 from copsense.extras import require
+from copsense.files import file_at
 from copsense.logs import read_log
 from copsense.logs.aligned_log import align_log
 from copsense.logs.log_motion import put_on_base, smooth_motion, smoothing_window
@@ -45,6 +47,11 @@ def load_run(
         InvalidInputError: no such file, something else, or of another robot.
         MissingExtraError: a package that its format takes is not installed.
     """
+    if not (file_at(path) or is_folder(Path(path))):
+        raise InvalidInputError(
+            f"no file at {str(path)[:300]!r}. Give a recording of copsense balance (--output "
+            "FILE.nc), a sweep (copsense sweep --output FILE.nc), or a robot's own log."
+        )
     mapped = "" if map_file is None else f", {str(map_file)!r}"
     if Path(path).suffix == RECORDED:
         if map_file is not None:
