@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import copsense
-from copsense.batch import PostureChart
+from copsense.batch import BatchKernel, PostureChart
 from copsense.errors import CopsenseError
 from copsense.maps import Axis, Grid, Sample, chunks
 from copsense.maps.chunks import ChunkEvaluator
@@ -47,6 +47,21 @@ def test_rows_are_those_of_the_reference(whole, icub, both, sample):
             }.items():
                 assert np.allclose(found[name].values, value, rtol=NEAR, atol=NEAR), name
             assert np.array_equal(found["tipping_edge"].values, expected.tipping_edge)
+
+
+def test_a_stored_number_is_the_computed_one_rounded(whole, icub, both, sample):
+    dataset = copsense.load_map(whole[0])
+    chart = PostureChart(icub, sample.names, over=sample.ends)
+    postures = chart.solve(sample.values(0, len(sample)))
+    there = np.flatnonzero(postures.converged)
+    result = BatchKernel(icub, both).evaluate(postures.configurations[there])
+    computed = {"cop": result.cops, "com": result.com, "load_share": result.load_share}
+    for name in ("com_gain", "com_travel", "margin"):
+        computed[name] = getattr(result, name)
+    for name, values in computed.items():
+        stored = dataset[name].values[there]
+        assert (np.abs(stored - values) <= 2.0**-24 * np.abs(values)).all(), name
+        assert (stored != values).any(), name
 
 
 def test_coordinates_are_where_the_postures_are(whole):
@@ -178,7 +193,10 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
             assert found == pytest.approx(nearest, rel=1e-5, abs=1e-6)
             reason = dataset["reason"].values[row, j]
             if statuses[row, j] == 3:
-                with pytest.raises(copsense.CopsenseError, match=re.escape(reason)):
+                # Which of a sole's edges, all but in line, are in conflict hangs on the last bits.
+                relaxed, _, conflict = reason.partition(" In conflict: ")
+                assert all(f"{name}: CoP at edge" in conflict for name in icub.contact_names)
+                with pytest.raises(copsense.CopsenseError, match=re.escape(relaxed)):
                     copsense.solve_equilibrium(here, criterion, limits)
             else:
                 assert reason == ""

@@ -7,7 +7,8 @@ rows of named coordinates, with the contacts in place.
 Both have a compiled kernel, and a reference that answers what the kernel does not cover.
 """
 
-from copsense.batch.postures.chart import PostureChart, chart_posture
+from copsense.batch.postures.chart import PostureChart
+from copsense.batch.postures.chart_posture import chart_posture
 from copsense.batch.postures.coordinates import coordinate_names
 from copsense.batch.postures.posture_batch import PostureBatch
 from copsense.batch.statics.batch_kernel import BatchKernel, evaluate_batch

@@ -21,6 +21,7 @@ from copsense.extras import require
 
 if TYPE_CHECKING:
     from copsense.maps import Axis, MapSummary
+    from copsense.maps.sampling import Sampling
     from copsense.stance import Stance
 
 
@@ -183,7 +184,7 @@ def map_command(
     with progress_bar(2 * len(sampling), "summary") as update:
         summary = summarise(store, update)
     if plot is not None:
-        _draw(stance, summary, plot, pair, marginal, force)
+        _draw(stance, sampling, summary, plot, pair, marginal, force)
     if as_json:
         echo_json(summary.to_dict() | {"plot": plot, "notes": list(plan.notes)})
     else:
@@ -242,6 +243,7 @@ def _pair(text: str | None, known: tuple[str, ...]) -> tuple[str, str] | None:
 
 def _draw(
     stance: Stance,
+    sampling: Sampling,
     summary: MapSummary,
     plot: str,
     names: tuple[str, str] | None,
@@ -262,7 +264,7 @@ def _draw(
         name: [
             skeleton(here)
             for here in worst_stances(
-                stance, [w for w in row.worst_travel[:3] if math.isfinite(w.value)]
+                stance, sampling, [w for w in row.worst_travel[:3] if math.isfinite(w.value)]
             )
         ]
         for name, row in summary.criteria.items()

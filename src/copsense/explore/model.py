@@ -12,7 +12,7 @@ from copsense.analysis.asked import asked_posture, determined_criteria, placed_s
 from copsense.analysis.limit_analysis import SIDES, analyse_limits
 from copsense.arrays import check_type
 from copsense.batch import PostureChart
-from copsense.batch.postures.chart import unreachable
+from copsense.batch.postures.chart_posture import unreachable
 from copsense.content import FrozenMapping
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench

@@ -46,7 +46,7 @@ class ChunkEvaluator:
             UnknownNameError: a coordinate or a joint that does not exist.
         """
         self.plan = plan
-        self._chart = PostureChart(plan.stance, plan.sampling.names)
+        self._chart = PostureChart(plan.stance, plan.sampling.names, over=plan.sampling.ends)
         _check_magnitudes(self._chart, plan.sampling)
         self._kernel = BatchKernel(plan.stance, plan.criteria)
         self._names = tuple(coordinate_columns(plan))

@@ -76,6 +76,12 @@ class _Axes:
         """Names of the coordinates."""
         return tuple(axis.name for axis in self.axes)
 
+    @property
+    def ends(self) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+        """Least and largest value of each coordinate."""
+        both = np.array([(axis.start, axis.stop) for axis in self.axes], dtype=float)
+        return both.min(axis=1), both.max(axis=1)
+
     def __len__(self) -> int:
         """Number of postures."""
         raise NotImplementedError

@@ -6,7 +6,7 @@ a leg of six joints under a flat foot is a 6 x 6 system of its own. See `Posture
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
 
@@ -14,24 +14,25 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from copsense.arrays import finite_number, whole_number
+from copsense.arrays import whole_number
 from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.postures.chart_values import checked_ends, checked_values
 from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
     Unit,
     chart_coordinates,
-    checked_values,
     joint_units,
     row_units,
     solved_whole,
 )
+from copsense.batch.postures.nearby import Nearby, nothing_nearby, postures_nearby
 from copsense.batch.postures.posture_batch import PostureBatch, empty_postures
 from copsense.batch.postures.reference_search import search_one
 from copsense.batch.postures.search_plan import plan_search
 from copsense.batch.postures.search_settings import BEYOND, ELSEWHERE, SOLVED, STUCK
 from copsense.batch.workspace import workspace, workspace_offsets
-from copsense.errors import InvalidInputError, UnreachablePostureError
+from copsense.errors import InvalidInputError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.path import COM_COORDINATES
 from copsense.posture import TOLERANCE
@@ -57,6 +58,11 @@ class PostureChart:
     directions) the base coordinates that are not named are solved for too. Where joints or base
     leave a choice, every step of the search is the smallest one. Each row starts from the stance's
     own configuration, so that it depends on its values alone.
+
+    Many rows between known ends are found faster with ``over``: a lattice over the ends is solved
+    once, and where postures are isolated, a row starts between those around it and takes two steps
+    instead of six. Where that leads nowhere it starts from the stance. What is found is the same to
+    1e-9; a row depends on its values and the ends alone.
 
     Where loops, couplings or hanging joints tie base and limbs together, the whole robot is solved
     for (`solve_posture`): base coordinates cannot be named, and what is not named stays as near to
@@ -84,7 +90,12 @@ class PostureChart:
         return f"PostureChart({self.stance.robot.name!r} over {', '.join(self.names)})"
 
     def __init__(
-        self, stance: Stance, coordinates: Sequence[str], *, compiled: bool = True
+        self,
+        stance: Stance,
+        coordinates: Sequence[str],
+        *,
+        compiled: bool = True,
+        over: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> None:
         """Find out what the names mean.
 
@@ -93,9 +104,12 @@ class PostureChart:
             coordinates: their names.
             compiled: whether the kernel may serve; False searches one posture at a time, which
                 takes milliseconds for each and waits for no compiler.
+            over: least and largest value of each coordinate, (k,) and (k,), between which most rows
+                will be [m, rad]. One posture at a time always starts from the stance.
 
         Raises:
-            InvalidInputError: no name, one twice, or two that contradict each other.
+            InvalidInputError: no name, one twice, or two that contradict each other; ends that are
+                not finite, or in the wrong order.
             UnknownNameError: a name that is not a coordinate.
         """
         if not len(coordinates):
@@ -123,6 +137,9 @@ class PostureChart:
             search_plan, search = plan_search(stance, layout, offset, self._coordinates)
             self._given = (*layout.parts, search_plan, offset, search)
             self._size = search.size
+        self._over = None if over is None else checked_ends(over, self.names)
+        known = self._over is not None and not self.fallback_reason
+        self._nearby = None if known else nothing_nearby(self._coordinates)
 
     @property
     def compiled(self) -> bool:
@@ -169,11 +186,28 @@ class PostureChart:
         x = checked_values(values, self.names)
         threads = whole_number(threads, "threads")
         batch = self.empty(len(x)) if out is None else self._fitting(out, len(x))
+        return self._search(x, batch, threads, self._known())
+
+    def _known(self) -> Nearby:
+        """Postures between which rows start, solved before the first; all threads find the same."""
+        if self._nearby is None:
+            assert self._over is not None
+            self._nearby = postures_nearby(
+                self.stance,
+                self._coordinates,
+                self._over,
+                lambda x, nearby: self._search(x, self.empty(len(x)), 1, nearby),
+            )
+        return self._nearby
+
+    def _search(
+        self, x: np.ndarray, batch: PostureBatch, threads: int, nearby: Nearby
+    ) -> PostureBatch:
         batch.reasons[:] = ""
         status = np.full(len(x), ELSEWHERE, dtype=np.int64)
         which, excess = np.zeros(len(x), dtype=np.int64), np.zeros(len(x))
         if not self.fallback_reason and len(x):
-            self._run(x, batch, status, which, excess, threads)
+            self._run(x, nearby, batch, status, which, excess, threads)
         said: dict[int, str] = {}
         for row in np.flatnonzero(status == ELSEWHERE):
             if self._whole:
@@ -209,6 +243,7 @@ class PostureChart:
     def _run(
         self,
         x: np.ndarray,
+        nearby: Nearby,
         batch: PostureBatch,
         status: np.ndarray,
         which: np.ndarray,
@@ -221,7 +256,7 @@ class PostureChart:
         found = Found(
             batch.configurations, batch.residuals, batch.iterations, status, which, excess
         )
-        arguments = (*self._given, x, found)
+        arguments = (*self._given, nearby, x, found)
         if self._code is None:
             given = (*arguments, workspace(1), 0, 0)
             self._code = bound(solve_postures, given, "the search for postures")
@@ -255,32 +290,3 @@ class PostureChart:
                     f"PostureChart.empty({count})."
                 )
         return out
-
-
-def chart_posture(stance: Stance, at: Mapping[str, float]) -> Stance:
-    """The one posture of a chart at some values, without the compiler.
-
-    Args:
-        stance: what the coordinates not named are kept from.
-        at: coordinate of `PostureChart` -> value [m, rad].
-
-    Raises:
-        UnreachablePostureError: there is none; the message says what remains.
-        InvalidInputError: as `PostureChart`, or a value that is not a number.
-        UnknownNameError: a name that is not a coordinate.
-    """
-    chart = PostureChart(stance, tuple(at), compiled=False)
-    values = [finite_number(value, f"the coordinate {name}") for name, value in at.items()]
-    found = chart.solve([values])
-    if not found.converged[0]:
-        raise unreachable(stance, at, str(found.reasons[0]))
-    return stance.at(found.configurations[0])
-
-
-def unreachable(stance: Stance, at: Mapping[str, float], reason: str) -> UnreachablePostureError:
-    """The error of a chart that has no posture at some values."""
-    asked = ", ".join(f"{name} = {round(value, 6) + 0.0:g}" for name, value in at.items())
-    return UnreachablePostureError(
-        f"no posture of {stance.robot.name!r} at {asked}: {reason.rstrip('.')}. The coordinates "
-        "that are not named keep the stance's values: ask for less, or name fewer."
-    )

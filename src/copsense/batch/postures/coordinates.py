@@ -14,7 +14,6 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from copsense.arrays import finite_array
 from copsense.content import ShortRepr
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.path import COM_COORDINATES
@@ -165,14 +164,6 @@ def chart_coordinates(stance: Stance, names: Sequence[str]) -> Coordinates:
 def roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
     """Angles of Rz(yaw) Ry(pitch) Rx(roll) [rad]."""
     return np.asarray(pin.rpy.matrixToRpy(np.array(rotation)))
-
-
-def checked_values(values: object, names: tuple[str, ...]) -> np.ndarray:
-    """Values (N, k) of the coordinates, contiguous."""
-    meaning = f"one posture in each row, columns {', '.join(names)}"
-    return np.ascontiguousarray(
-        finite_array(values, "values of a chart", (None, len(names)), meaning)
-    )
 
 
 def joint_units(stance: Stance) -> list[tuple[str, Unit]]:

@@ -9,6 +9,9 @@ the Levenberg-Marquardt step in its least-norm form: Newton's own where J is squ
 correction where there are more unknowns than rows, least squares where there are fewer, and still
 quadratic near a solution (Yamashita and Fukushima 2001). s shortens what is too long. A lane that
 is done takes the next posture, so that no lane waits for the slowest.
+
+A search starts between known postures where there are some around its row (`nearby`), and where
+that leads nowhere once more from the stance.
 """
 
 from __future__ import annotations
@@ -22,11 +25,11 @@ from copsense.batch.kinematics import move, place_feet
 from copsense.batch.lanes import get, load, magnitude, put, root, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.postures.constraints import errors, jacobian, spread
+from copsense.batch.postures.nearby import Nearby
 from copsense.batch.postures.search_plan import SearchOffsets, SearchPlan
 from copsense.batch.postures.search_settings import (
     BEYOND,
     DAMPING,
-    ELSEWHERE,
     FLOOR,
     LONGEST_STEP,
     MOST_STEPS,
@@ -37,7 +40,7 @@ from copsense.batch.postures.search_settings import (
     TINY,
     UNSOLVED,
 )
-from copsense.batch.vectors import LARGEST_ANGLE
+from copsense.batch.postures.starting import begin, give, take
 from copsense.batch.workspace import WIDTH, Offsets
 from copsense.posture import TOLERANCE
 from copsense.stance import AT_LIMIT
@@ -70,6 +73,7 @@ def solve_postures(
     plan: SearchPlan,
     offset: Offsets,
     search: SearchOffsets,
+    nearby: Nearby,
     values: Any,
     found: Found,
     W: Any,
@@ -77,12 +81,12 @@ def solve_postures(
     stop: int,
 ) -> None:
     """Solve postures start to stop, `WIDTH` abreast."""
-    following, busy = start, 0
+    given, following, busy = (plan, offset, search, nearby, values), start, 0
     for lane in range(WIDTH):
-        following, taken = _take(plan, offset, search, values, found, W, lane, following, stop)
+        following, taken = take(given, found.status, W, lane, following, stop)
         busy += taken >= 0
         if taken < 0:  # so that it computes with something
-            _give(plan, offset, search, values, W, lane, -1)
+            give(plan, offset, search, values, W, lane, -1)
     while busy > 0:
         spread(tree, plan, offset, search, W)
         move(tree, offset, W)
@@ -106,8 +110,15 @@ def solve_postures(
                 put(W, search.going, lane, 1.0)
                 put(W, search.steps, lane, steps + 1)
                 continue
-            _write(plan, offset, search, found, W, lane, row, done, steps)
-            following, taken = _take(plan, offset, search, values, found, W, lane, following, stop)
+            which, most = _farthest(plan, search, W, lane) if done == SOLVED else (0, 0.0)
+            if done == SOLVED and most > AT_LIMIT:
+                done = BEYOND
+            if done != SOLVED and get(W, search.nearby, lane) > 0.0:
+                give(plan, offset, search, values, W, lane, row)
+                begin(search, W, lane, 0.0, steps)
+                continue
+            _write(offset, search, found, W, lane, row, done, which, most)
+            following, taken = take(given, found.status, W, lane, following, stop)
             busy -= taken < 0
         if busy > 0:
             for limb in range(len(plan.contact_first) - 1):
@@ -116,63 +127,19 @@ def solve_postures(
 
 
 @compiled
-def _take(
-    plan: SearchPlan,
-    offset: Offsets,
-    search: SearchOffsets,
-    values: Any,
-    found: Found,
-    W: Any,
-    lane: int,
-    following: int,
-    stop: int,
-) -> tuple[int, int]:
-    """Begin the next posture in a lane: the one after it, and itself (-1 where none is left)."""
-    put(W, search.steps, lane, 0)
-    while following < stop:
-        row = following
-        following += 1
-        if _give(plan, offset, search, values, W, lane, row):
-            put(W, search.posture, lane, row)
-            return following, row
-        found.status[row] = ELSEWHERE
-    put(W, search.posture, lane, -1)
-    return following, -1
-
-
-@compiled
-def _give(
-    plan: SearchPlan,
-    offset: Offsets,
-    search: SearchOffsets,
-    values: Any,
-    W: Any,
-    lane: int,
-    row: int,
-) -> bool:
-    """Set a lane to the stance with a posture's values; whether they are of ordinary size."""
-    for i in range(len(plan.given)):
-        put(W, search.given + i, lane, plan.given[i])
-    for i in range(4):
-        put(W, offset.q + 3 + i, lane, plan.quaternion[i])
-    if row < 0:
-        return True
-    ordinary = True
-    com = len(plan.given) - 3 * len(plan.position) - 3
-    for i in range(len(plan.place)):
-        value, where = values[row, i], plan.place[i]
-        ordinary = ordinary and abs(value) < 0.1 * LARGEST_ANGLE
-        put(W, search.given + where, lane, value)
-        axis = where - com
-        if 0 <= axis < 3:  # the base goes where the CoM goes, to begin with
-            moved = plan.given[axis] + value - plan.given[where]
-            put(W, search.given + axis, lane, moved)
-    return ordinary
+def _farthest(plan: SearchPlan, search: SearchOffsets, W: Any, lane: int) -> tuple[int, float]:
+    """The joint that is farthest beyond its limit, and by how much; AT_LIMIT where none is."""
+    which, most = 0, AT_LIMIT
+    for i in range(len(plan.low)):
+        x = get(W, search.given + 6 + i, lane)
+        beyond = max(plan.low[i] - x, x - plan.high[i])
+        if beyond > most:
+            which, most = i, beyond
+    return which, most
 
 
 @compiled
 def _write(
-    plan: SearchPlan,
     offset: Offsets,
     search: SearchOffsets,
     found: Found,
@@ -180,17 +147,12 @@ def _write(
     lane: int,
     row: int,
     status: int,
-    steps: int,
+    which: int,
+    most: float,
 ) -> None:
     for i in range(found.configurations.shape[1]):
         found.configurations[row, i] = get(W, offset.q + i, lane)
-    which, most = 0, AT_LIMIT
-    if status == SOLVED:
-        for i in range(len(plan.low)):
-            x = get(W, search.given + 6 + i, lane)
-            beyond = max(plan.low[i] - x, x - plan.high[i])
-            if beyond > most:
-                which, most, status = i, beyond, BEYOND
+    if status in (SOLVED, BEYOND):
         found.excess[row] = most
     else:
         most = -1.0
@@ -200,7 +162,8 @@ def _write(
                 which, most = i, size
     found.which[row] = which
     found.residuals[row] = get(W, search.worst, lane)
-    found.iterations[row], found.status[row] = steps, status
+    found.iterations[row] = int(get(W, search.steps, lane) + get(W, search.spent, lane))
+    found.status[row] = status
 
 
 @compiled

@@ -60,7 +60,9 @@ class SearchOffsets(NamedTuple):
         worst: the largest of them.
         going: above zero where the lane is not done.
         posture: number of the posture in the lane; -1 where there is none.
-        steps: taken for it.
+        steps: taken for it, from where it was begun last.
+        spent: taken before that, in vain.
+        nearby: above zero where it was begun between known postures.
         before: the largest error some steps ago.
         J: by rows.
         M: J J' + mu 1, then its Cholesky factor, by rows.
@@ -76,6 +78,8 @@ class SearchOffsets(NamedTuple):
     going: int
     posture: int
     steps: int
+    spent: int
+    nearby: int
     before: int
     J: int
     M: int
@@ -121,6 +125,8 @@ def plan_search(
         "going": 1,
         "posture": 1,
         "steps": 1,
+        "spent": 1,
+        "nearby": 1,
         "before": 1,
         "J": m * most,
         "M": m * m,

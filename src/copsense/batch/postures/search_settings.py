@@ -8,4 +8,5 @@ MOST_STEPS = 60
 PATIENCE = 6  # steps after which the worst error must have come down ...
 PROGRESS = 0.5  # ... to this share
 OPPOSITE = 0.2  # 1 + trace of a turn over about 155 deg, which is taken as this one
+EDGE = 1e-9  # of a cell: how far beyond the ends of known postures a row may be, by rounding
 SOLVED, UNSOLVED, STUCK, BEYOND, ELSEWHERE = 0, 1, 2, 3, 4  # how a search ended
