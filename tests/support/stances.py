@@ -3,6 +3,8 @@
 import numpy as np
 
 import copsense
+from copsense.criterion import TorqueTerm, WrenchTerm, reference_wrench
+from copsense.posture import supporting_joints
 from support.grounds import off_centre, on_tilted_planes, with_hand
 
 WRENCH, TORQUE = copsense.minimum_wrench(0.7), copsense.minimum_torque()
@@ -65,3 +67,23 @@ CASES = {
     "anymal_c": lambda load: load("anymal_c"),
     "solo12 on three feet": lambda load: load("solo12").with_contacts(load("solo12").contacts[1:]),
 }
+
+
+def weighed(stance):
+    """Criteria with references, with weights of each contact's own, and with full weights."""
+    rng = np.random.default_rng(3)
+    nc, m, n = len(stance.contacts), len(stance.component_index), len(stance.robot.torque_names)
+    held = np.flatnonzero(supporting_joints(stance)[stance.robot.base_nv :])
+    coupled, full = np.diag(np.linspace(0.5, 3.0, n)), 0.3 * rng.standard_normal((m, m))
+    more = 0.3 * rng.standard_normal((len(held), len(held)))
+    coupled[np.ix_(held, held)] += more @ more.T
+    reference = np.tile([2.0, -3.0, stance.robot.weight / nc, 1.0, 2.0, 0.5], (nc, 1))
+    each = {c.name: [1.0, 2.0, 0.5 + k, 4.0, 3.0, 5.0] for k, c in enumerate(stance.contacts)}
+    torques = copsense.weighted_torque(coupled, name="full torque weights")
+    whole = WrenchTerm(full @ full.T + np.eye(m), reference)
+    return [
+        reference_wrench(reference, 0.5),
+        copsense.Criterion("full weights", (whole, TorqueTerm(0.1))),
+        torques,
+        copsense.mixed((torques, 1.0), (copsense.Criterion("each", (WrenchTerm(each),)), 0.2)),
+    ]

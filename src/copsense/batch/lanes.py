@@ -177,6 +177,18 @@ def any_less(typing: Any, a: Any, b: Any) -> Any:
 
 
 @primitive
+def least(typing: Any, x: Any) -> Any:
+    """The smallest of a value's numbers."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        kind = ir.FunctionType(ir.DoubleType(), [_VECTOR])
+        name = f"llvm.vector.reduce.fmin.v{WIDTH}f64"
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
+
+    return types.float64(x), generate
+
+
+@primitive
 def get(typing: Any, W: Any, row: Any, lane: Any) -> Any:
     """One posture's number in a row of a workspace."""
 

@@ -117,6 +117,8 @@ class Offsets(NamedTuple):
     group: int
     inner: int
     inner_group: int
+    own: int
+    nu: int
     rate: int
     twist: int
     middle: int
@@ -190,6 +192,8 @@ def workspace_offsets(layout: RobotLayout, nq: int) -> Offsets:
         "group": 6 * ng,
         "inner": 6 * nc,
         "inner_group": 6 * ng,
+        "own": 6 * nc,
+        "nu": ns,
         "rate": ns,
         "twist": 3,
         "middle": 12,

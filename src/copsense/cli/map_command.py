@@ -156,6 +156,9 @@ def map_command(
             _note(
                 f"postures are evaluated one at a time, milliseconds each: {kernel.fallback_reason}"
             )
+        else:
+            for name, why in kernel.by_reference.items():
+                _note(f"{name} is evaluated one posture at a time, milliseconds each: {why}")
         _note(height_advice(stance, sampling))
     done = 0
     with progress_bar(len(sampling), "map") as update:

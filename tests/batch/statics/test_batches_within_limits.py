@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 from support.grounds import off_centre, with_hand
 from support.random_cases import Case
 from support.raw_qp import raw_problem
-from support.stances import CASES, postures, served
+from support.stances import CASES, postures, served, weighed
 
 import copsense
 from copsense import Limits
@@ -57,25 +57,29 @@ def answers(case):
     """Of a case: its stance, configurations, limits, and what the kernel answers."""
     made = {}
 
-    def get(name):
-        if name not in made:
+    def get(name, choose=served):
+        if (name, choose) not in made:
             stance = case(name)
             q = postures(stance, PER_CASE, seed=4)
             limits = tight(stance, q)
-            kernel = BatchKernel(stance, served(stance), limits)
+            kernel = BatchKernel(stance, choose(stance), limits)
             assert not kernel.fallback_reason
-            made[name] = stance, q, limits, kernel.evaluate(q)
-        return made[name]
+            assert not kernel.by_reference
+            made[name, choose] = stance, q, limits, kernel.evaluate(q)
+        return made[name, choose]
 
     return get
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_kernel_equals_the_reference_within_limits(answers, name):
-    stance, q, limits, found = answers(name)
+BOTH = [(name, served) for name in CASES] + [("icub", weighed), ("talos on slopes", weighed)]
+
+
+@pytest.mark.parametrize(("name", "choose"), BOTH)
+def test_the_kernel_equals_the_reference_within_limits(answers, name, choose):
+    stance, q, limits, found = answers(name, choose)
     within = found.limits
     seen = np.zeros(4, dtype=int)
-    for (i, j), criterion in zip(np.ndindex(len(q), 4), served(stance) * len(q), strict=True):
+    for (i, j), criterion in zip(np.ndindex(len(q), 4), choose(stance) * len(q), strict=True):
         state = within.state[i, j]
         seen[state] += 1
         expected, error = reference_answer(stance.at(q[i]), criterion, limits)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.stances import CASES, postures, served
+from support.stances import CASES, postures, served, weighed
 
 import copsense
 from copsense.batch import BatchKernel, evaluate_batch
@@ -22,12 +22,25 @@ def largest_error(given, expected):
     return float((errors / np.maximum(sizes, 1e-12)).max())
 
 
+WEIGHED = ("icub", "icub, hand on a wall", "talos on slopes", "solo12 on three feet")
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_the_kernel_equals_the_reference(case, name):
-    stance = case(name)
-    kernel, criteria = BatchKernel(stance, served(stance)), served(stance)
+    equals_the_reference(case(name), served, PER_CASE)
+
+
+@pytest.mark.parametrize("name", WEIGHED)
+def test_references_and_full_weights_are_served_too(case, name):
+    equals_the_reference(case(name), weighed, count=5)
+
+
+def equals_the_reference(stance, choose, count):
+    criteria = choose(stance)
+    kernel = BatchKernel(stance, criteria)
     assert not kernel.fallback_reason
-    q = postures(stance, PER_CASE)
+    assert not kernel.by_reference
+    q = postures(stance, count)
     found = kernel.evaluate(q)
     assert not found.reasons
     for i, row in enumerate(q):

@@ -9,6 +9,7 @@ from support.stances import postures, served
 
 import copsense
 from copsense.batch import BatchKernel, evaluate_batch
+from copsense.criterion import PreloadTerm, TorqueTerm
 
 TORQUE = copsense.minimum_torque()
 
@@ -45,17 +46,28 @@ def test_other_criteria_are_answered_by_the_reference(case):
     def policy(q):
         return copsense.solve_equilibrium(stance.at(q), TORQUE).wrenches
 
+    n = len(stance.robot.torque_names)
     criteria = [
         TORQUE,
         copsense.weighted_torque("inverse inertia", name="inertia"),
         copsense.minimum_tangential(TORQUE),
-        copsense.criterion.reference_wrench(np.tile([0, 0, 150.0, 0, 0, 0], (2, 1)), 0.5),
+        copsense.weighted_torque(np.eye(n) + 0.5 / n, name="coupled"),
+        copsense.Criterion("preload", (TorqueTerm(), PreloadTerm(np.full((2, 6), 0.01)))),
         policy,
     ]
     kernel = BatchKernel(stance, criteria)
     assert not kernel.fallback_reason
+    assert kernel.by_reference == {
+        "inertia": "its torque weights follow the inertia",
+        "minimum-tangential": "its weights leave wrenches to a tie-break",
+        "coupled": "its torque weights couple joints between the contacts with others",
+        "preload": "it has a preload that no wrench weights bear",
+        "policy": "it is a policy",
+    }
     found = same_as_reference(stance, postures(stance, 2), criteria)
-    assert found.criteria == (*(c.name for c in criteria[:4]), "policy")
+    assert found.criteria == ("minimum-torque", *kernel.by_reference)
+    alone = BatchKernel(stance, criteria[1:])
+    assert "inertia: its torque weights follow the inertia; " in alone.fallback_reason
 
 
 def test_planar_robots_are_answered_by_the_reference(stance_of):

@@ -21,7 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from copsense.batch.compiler import compiled
+from copsense.batch.lanes import least, load, splat, store, where_less
 from copsense.batch.statics.kernel_limits import KernelLimits
+from copsense.batch.workspace import WIDTH
 
 INFEASIBLE, FAILED = -1, -2
 _DEPENDENT = 1e-18  # share (squared) that the held rows must leave of another, as in `Program`
@@ -43,13 +45,17 @@ class Programs(NamedTuple):
         wrench: w_0 (6 nc,).
         torque: tau_0 (ns,).
         limit: of each support joint's torque (ns,).
-        inverse: 1 / norm of each row over the contacts' wrenches (rc + 2 ns,).
+        inverse: 1 / norm of each row over the contacts' wrenches (rows,): those of the contacts,
+            two of each support joint, and up to a multiple of `WIDTH` others, never broken.
+        number: of each row (rows,).
         x: the point (m,).
         centre: what it shall be near to (m,).
         now: the wrenches at x (6 nc,).
         felt: the torques at x (ns,).
-        slack: of each row at x (rc + 2 ns,).
-        start: of each row where the search began (rc + 2 ns,).
+        push: derivatives of the cost by the wrenches (6 nc,).
+        strain: and by the torques (ns,).
+        slack: of each row at x (rows,).
+        start: of each row where the search began (rows,).
         Q: orthonormal, its first columns span the held rows (m, m).
         R: upper triangular (m, m).
         a: a row (m,).
@@ -65,10 +71,13 @@ class Programs(NamedTuple):
     torque: np.ndarray
     limit: np.ndarray
     inverse: np.ndarray
+    number: np.ndarray
     x: np.ndarray
     centre: np.ndarray
     now: np.ndarray
     felt: np.ndarray
+    push: np.ndarray
+    strain: np.ndarray
     slack: np.ndarray
     start: np.ndarray
     Q: np.ndarray
@@ -80,26 +89,32 @@ class Programs(NamedTuple):
     held: np.ndarray
 
 
-def programs(contacts: int, supports: int, unknowns: int, rows: int) -> Programs:
+def programs(limits: KernelLimits, contacts: int, supports: int, unknowns: int) -> Programs:
     """Memory for one thread."""
-    m, r = unknowns + 1, rows + 2 * supports
+    m, rows = unknowns + 1, len(limits.bound) + 2 * supports
+    rows += -rows % WIDTH
     sizes: dict[str, Any] = {
         "N": (6 * contacts, m),
         "B": (supports, m),
         "wrench": 6 * contacts,
         "torque": supports,
         "limit": supports,
-        "inverse": r,
         "now": 6 * contacts,
         "felt": supports,
-        "slack": r,
-        "start": r,
+        "push": 6 * contacts,
+        "strain": supports,
         "Q": (m, m),
         "R": (m, m),
     }
     sizes |= dict.fromkeys(("x", "centre", "a", "d", "rate", "u"), m)
     arrays = {name: np.zeros(size) for name, size in sizes.items()}
-    return Programs(**arrays, held=np.zeros(m, dtype=np.int64))
+    arrays |= {name: np.full(rows, np.inf) for name in ("slack", "start")}
+    return Programs(
+        **arrays,
+        inverse=np.append(limits.inverse, np.ones(rows - len(limits.bound))),
+        number=np.arange(rows, dtype=float),
+        held=np.zeros(m, dtype=np.int64),
+    )
 
 
 @compiled
@@ -179,25 +194,33 @@ def measure(limits: KernelLimits, p: Programs, n: int, soft: bool) -> int:
     for t in range(len(p.felt)):
         p.slack[rc + 2 * t] = p.limit[t] - p.felt[t] + more
         p.slack[rc + 2 * t + 1] = p.limit[t] + p.felt[t] + more
-    worst, found = np.inf, 0
-    for i in range(len(p.slack)):
-        s = p.slack[i] if soft else p.slack[i] * p.inverse[i]
-        if s < worst:
-            worst, found = s, i
-    return found
+    return _most_broken(p, soft)
+
+
+@compiled
+def _most_broken(p: Programs, soft: bool) -> int:
+    """The row of least slack, of its norm; the first of several."""
+    worst, found = splat(np.inf), splat(0.0)
+    for i in range(len(p.slack) // WIDTH):
+        s = load(p.slack, i)
+        if not soft:
+            s = s * load(p.inverse, i)
+        found = where_less(s, worst, load(p.number, i), found)
+        worst = where_less(s, worst, s, worst)
+    return int(least(where_less(least(worst), worst, splat(np.inf), found)))
 
 
 @compiled
 def contact_slack(limits: KernelLimits, wrenches: Any, slack: Any, more: float) -> None:
     """Slack of the contacts' rows, bound - c . w and `more` (rc,), of wrenches (6 nc,)."""
-    c = limits.coefficient
+    c, n = limits.coefficient, len(limits.bound) // WIDTH
     for k in range(len(limits.first) - 1):
-        # Numbers, not an array that what is written might change: a processor's lanes can be used.
-        a, b, d = wrenches[6 * k], wrenches[6 * k + 1], wrenches[6 * k + 2]
-        e, f, g = wrenches[6 * k + 3], wrenches[6 * k + 4], wrenches[6 * k + 5]
-        for i in range(limits.first[k], limits.first[k + 1]):
-            force = c[0, i] * a + c[1, i] * b + c[2, i] * d
-            slack[i] = limits.bound[i] + more - (force + c[3, i] * e + c[4, i] * f + c[5, i] * g)
+        at = 6 * k
+        for i in range(limits.first[k] // WIDTH, limits.first[k + 1] // WIDTH):
+            s = load(limits.bound, i) + more
+            for e in range(6):
+                s = s - wrenches[at + e] * load(c, n * e + i)
+            store(slack, i, s)
 
 
 @compiled

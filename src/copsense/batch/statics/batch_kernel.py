@@ -8,9 +8,10 @@ the reference answers all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import TypeGuard
 
 import numpy as np
@@ -58,6 +59,7 @@ class BatchKernel:
         gains: whether CoM gain, CoM travel and tipping edge are computed too.
         fallback_reason: why the reference answers everything; empty where the kernel does its
             part.
+        by_reference: criterion -> why the reference answers it where the kernel does its part.
     """
 
     stance: Stance
@@ -66,6 +68,7 @@ class BatchKernel:
     limits: Limits | None
     gains: bool
     fallback_reason: str
+    by_reference: Mapping[str, str]
 
     def __repr__(self) -> str:
         """Robot and criteria, and whether the kernel serves them."""
@@ -118,22 +121,22 @@ class BatchKernel:
         for criterion in self.criteria:
             if isinstance(criterion, Criterion):
                 criterion.at(stance)  # weights that do not fit are an error, not a failed row
-        served = kernel_criteria(stance, () if self.fallback_reason else self.criteria)
-        self._served = served.column
-        self._serves_all = len(served.column) == len(self.criteria)
         lines = [c.name for c in stance.contacts if c.sole is not None and len(c.sole) == 2]
         if not self.fallback_reason and lines:
             self.fallback_reason = f"the sole of {lines[0]} is a line"
-        if not self.fallback_reason and not len(served.column):
-            self.fallback_reason = "no criterion is a weighted norm of torques and wrenches"
+        self.by_reference, self._served = MappingProxyType({}), np.zeros(0, dtype=np.int64)
         if not self.fallback_reason:
             layout = robot_layout(stance, sole_edges(stance))
+            served, self.by_reference = kernel_criteria(stance, layout.feet, self.criteria)
+            self._served = served.column
+            if not len(layout.feet.support):
+                self.fallback_reason = "no joint moves between the contacts"
+            elif not len(served.column):
+                self.fallback_reason = "; ".join(f"{n}: {w}" for n, w in self.by_reference.items())
             self._kernel = CompiledKernel(layout, served, self._nq)
             if self.limits is not None:
                 rows = kernel_limits(stance, self.limits)
                 self._within = CompiledLimits(layout, served, rows, self._nq)
-            if not len(layout.feet.support):
-                self.fallback_reason = "no joint moves between the contacts"
 
     @property
     def compiled(self) -> bool:
@@ -348,7 +351,7 @@ class _Single:
         self.q, self.result = np.zeros((1, kernel._nq)), kernel.empty(1)
         self.row = self.q[0]
         self.doubtful = np.ones((1, len(kernel.names)), dtype=np.uint8)
-        self._partial = not kernel._serves_all  # in doubt whatever the kernel says
+        self._partial = len(kernel._served) < len(kernel.names)  # in doubt whatever the kernel says
         self._fill: Callable[[int, int], bool] | None = None
         if not kernel.fallback_reason:
             self._fill = kernel._filling(self.q, self.result, self.doubtful, 1)

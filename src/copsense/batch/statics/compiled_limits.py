@@ -57,7 +57,7 @@ class CompiledLimits:
             np.zeros((WIDTH, m), dtype=np.int64),
             np.zeros((WIDTH, m)),
         )
-        memory = programs(len(feet.body), len(feet.support), feet.unknowns, len(self._limits.bound))
+        memory = programs(self._limits, len(feet.body), len(feet.support), feet.unknowns)
         return workspace(self._offset.size), memory, pack
 
     def filling(

@@ -5,7 +5,7 @@ wrenches (sum mu_k = 0) that the criterion's curvature H answers to l with, H(mu
 every contact, xi one twist for all. Differentiating the criterion's condition along mu leaves
 
     dp = xi . db + sum_i [lambda_i (dG_i - ds_i . phi_i) - nu_i ds_i . mu_i],
-    nu_i = w_i tau_i,  lambda_i = -w_i s_i . mu_i      (phi_i, mu_i: sums over what joint i carries)
+    nu = W tau,  lambda_i = -(W s . mu)_i      (phi_i, mu_i: sums over what joint i carries)
 
 and no derivative of an inverse. Where limits press, mu leaves them as they are; a torque's
 multiplier l_i adds to nu_i, the response of it to lambda_i, and that of a contact's limits to xi.
@@ -27,10 +27,10 @@ from copsense.batch.layout import PRISMATIC, Feet, Tree
 from copsense.batch.statics.com_gains import along_motions
 from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
 from copsense.batch.statics.limit_offsets import LimitOffsets
-from copsense.batch.statics.load_sharing import across_symmetric
+from copsense.batch.statics.load_sharing import across_symmetric, own_wrenches, weigh
 from copsense.batch.statics.loops import expand, gather_groups, times_lower, times_upper
 from copsense.batch.statics.tangents import project, store_base
-from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, store3, sub3
+from copsense.batch.vectors import across, add3, cross3, dot3, load3, scale3, store3, sub3
 from copsense.batch.workspace import Offsets
 
 LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight
@@ -106,14 +106,15 @@ def torque_gradients(
     """
     nv = len(tree.parent) + 5
     _lever_arms(tree, feet, offset, W)
+    _multipliers(feet, offset, W, criteria, index, limits)
     for k in range(len(feet.body)):
         if feet.point[k]:
             _stand_still(offset, W, k, nv)
             continue
         for output in range(_outputs(feet, k, gains)):
             at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
-            _adjoint(tree, feet, offset, W, criteria, index, k, output, limits)
-            _sweep(tree, feet, offset, W, criteria, index, at, limits)
+            _adjoint(feet, offset, W, criteria, index, k, output, limits)
+            _sweep(tree, feet, offset, W, at)
             if output == LOAD:
                 # The motions it meets are admissible: nothing has to be projected.
                 for t in range(len(feet.support)):
@@ -131,6 +132,25 @@ def _lever_arms(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
         F, M = screw_cross(W, offset.screw + 6 * i, load3(W, phi), load3(W, phi + 3))
         store3(W, offset.lever_arm + 6 * t, F)
         store3(W, offset.lever_arm + 6 * t + 3, add3(M, load3(W, offset.weight + 3 * i)))
+
+
+@compiled
+def _multipliers(
+    feet: Feet,
+    offset: Offsets,
+    W: Any,
+    criteria: KernelCriteria,
+    index: int,
+    limits: LimitOffsets | None,
+) -> None:
+    """nu of the support joints, the same for every output."""
+    for t in range(len(feet.support)):
+        store(W, offset.felt + t, load(W, offset.torque + feet.support[t]))
+    for t in range(len(feet.support)):
+        nu = weigh(W, criteria.torque[index], criteria.torque_reach[index], t, offset.felt)
+        if limits is not None:
+            nu = nu + load(W, limits.pressing + t)
+        store(W, offset.nu + t, nu)
 
 
 @compiled
@@ -152,7 +172,6 @@ def _covector(feet: Feet, offset: Offsets, W: Any, k: int, output: int) -> Any:
 
 @compiled
 def _adjoint(
-    tree: Tree,
     feet: Feet,
     offset: Offsets,
     W: Any,
@@ -191,19 +210,18 @@ def _adjoint(
     gather_groups(feet, W, offset.inner, offset.inner_group)
     if held != k:
         v, w = scale3(0.0, v), scale3(0.0, w)
-    if weighted:
-        # W_f mu of the held contact, moved to the base's origin.
-        F, M = load3(W, offset.inner + 6 * held), load3(W, offset.inner + 6 * held + 3)
-        r_held = load3(W, offset.foot + 3 * held)
-        m = scale3(criteria.moment[index], sub3(M, cross3(r_held, F)))
-        v = add3(v, add3(scale3(criteria.force[index], F), cross3(r_held, m)))
-        w = add3(w, m)
+    if criteria.wrench_reach[index] >= 0:
+        own_wrenches(feet, offset, W, offset.inner, offset.own)
+        more = _held_cost(offset, W, criteria, index, held)
+        v, w = add3(v, more[0]), add3(w, more[1])
     for t in range(ns):
         i, mu = feet.support[t], offset.inner_group + 6 * feet.group[t]
         s = offset.screw + 6 * i
         change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
-        weight = criteria.joint[index, i] if weighted else 1.0
-        rate = change * (-weight)
+        store(W, offset.felt + t, change)
+    for t in range(ns):
+        s = offset.screw + 6 * feet.support[t]
+        rate = -weigh(W, criteria.torque[index], criteria.torque_reach[index], t, offset.felt)
         if limits is not None:
             for j in range(r):
                 response = load(W, limits.torque_response + r * t + j)
@@ -219,6 +237,28 @@ def _adjoint(
 
 
 @compiled
+def _held_cost(offset: Offsets, W: Any, criteria: KernelCriteria, index: int, held: int) -> Any:
+    """W_f of the wrenches `own` at the held contact, a covector on its wrench there.
+
+    Moved to the base's origin: (f + r x m, m).
+    """
+    weights, reach, i = criteria.wrench[index], criteria.wrench_reach[index], 6 * held
+    axes = offset.foot_rotation + 9 * held
+    f = (
+        weigh(W, weights, reach, i, offset.own),
+        weigh(W, weights, reach, i + 1, offset.own),
+        weigh(W, weights, reach, i + 2, offset.own),
+    )
+    m = (
+        weigh(W, weights, reach, i + 3, offset.own),
+        weigh(W, weights, reach, i + 4, offset.own),
+        weigh(W, weights, reach, i + 5, offset.own),
+    )
+    w = across(W, axes, m)
+    return add3(across(W, axes, f), cross3(load3(W, offset.foot + 3 * held), w)), w
+
+
+@compiled
 def _leave(limits: LimitOffsets, offset: Offsets, W: Any, r: int) -> None:
     """Of a gradient along x, what the pressing limits leave; the gradient is kept as `shift`."""
     for j in range(r):
@@ -231,19 +271,9 @@ def _leave(limits: LimitOffsets, offset: Offsets, W: Any, r: int) -> None:
 
 
 @compiled
-def _sweep(
-    tree: Tree,
-    feet: Feet,
-    offset: Offsets,
-    W: Any,
-    criteria: KernelCriteria,
-    index: int,
-    at: int,
-    limits: LimitOffsets | None,
-) -> None:
+def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int) -> None:
     """One output's gradient (nv,) at row `at`, base in world axes, not yet projected."""
     ns = len(feet.support)
-    weighted = criteria.kind[index] != LEAST_TORQUE
     g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
     base = load3(W, offset.twist)
     store_base(tree, offset, W, at, cross3(base, g))
@@ -257,11 +287,7 @@ def _sweep(
         store3(W, offset.turning + 3 * t, omega)
         mu = offset.inner_group + 6 * feet.group[t]
         F, M = screw_cross(W, offset.screw + 6 * i, load3(W, mu), load3(W, mu + 3))
-        nu = load(W, offset.torque + i)
-        if weighted:
-            nu = nu * criteria.joint[index, i]
-        if limits is not None:
-            nu = nu + load(W, limits.pressing + t)
+        nu = load(W, offset.nu + t)
         A = offset.lever_arm + 6 * t
         F = scale3(-1.0, add3(scale3(rate, load3(W, A)), scale3(nu, F)))
         M = scale3(-1.0, add3(scale3(rate, load3(W, A + 3)), scale3(nu, M)))

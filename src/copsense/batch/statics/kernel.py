@@ -82,7 +82,7 @@ def evaluate_postures(
         for index in range(len(criteria.kind)):
             store(W, offset.doubt, load(W, offset.flag))
             if criteria.kind[index] == LEAST_WRENCH:
-                arm = criteria.force[index] / criteria.moment[index]
+                arm = criteria.arm[index]
                 least_wrench(feet, offset, W, arm)
                 finish(tree, feet, offset, W)
                 wrench_gradients(tree, feet, offset, W, arm, gains)

@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from copsense.batch.compiler import compiled
-from copsense.batch.lanes import get
+from copsense.batch.lanes import get, least, load, splat, where_less
 from copsense.batch.layout import Feet
 from copsense.batch.statics.active_set import contact_slack
 from copsense.batch.statics.kernel import Out
 from copsense.batch.statics.kernel_limits import KernelLimits
 from copsense.batch.statics.limit_states import WITHIN
-from copsense.batch.workspace import Offsets
+from copsense.batch.workspace import WIDTH, Offsets
 
 _NEAR = 1e-8  # weights: slack, of rows of norm one to ten, under which a posture is looked at
 
@@ -61,10 +61,10 @@ def begin_row(
     found.relaxation[row] = 0.0
     for k in range(found.conflict.shape[1]):
         found.conflict[row, k] = -1
-    least = row_margins(feet, rows, out, found.own_margins, slack, row, column)
+    nearest = row_margins(feet, rows, out, found.own_margins, slack, row, column)
     for g in range(found.margins.shape[2]):
         found.margins[row, column, g] = found.own_margins[row, column, g]
-    return least < _NEAR * feet.weight
+    return nearest < _NEAR * feet.weight
 
 
 @compiled
@@ -76,24 +76,38 @@ def row_margins(
     `slack` is memory for the contacts' rows. A row longer than one counts by its norm.
     """
     contact_slack(rows, out.wrenches[row, column], slack, 0.0)
-    least = np.inf
+    near = splat(np.inf)
+    for i in range(len(rows.bound) // WIDTH):
+        s = load(slack, i) * load(rows.short, i)
+        near = where_less(s, near, s, near)
+    nearest = least(near)
     for k in range(len(feet.body)):
         normal = out.wrenches[row, column, 6 * k + 2]
         for g in range(rows.group_first[k], rows.group_first[k + 1]):
             start, stop = rows.group_rows[g], rows.group_rows[g + 1]
-            low, high = slack[start], slack[start]
-            for i in range(start, stop):
-                low, high = min(low, slack[i]), max(high, slack[i])
-                least = min(least, slack[i] * rows.short[i])
+            margin = _smallest(slack, start, stop, 1.0)
             if rows.cop[g]:  # a length: of a contact that pulls, signs turn
-                low = low / normal if normal > 0.0 else high / normal
-            margins[row, column, g] = low
+                if normal > 0.0:
+                    margin = margin / normal
+                else:
+                    margin = -_smallest(slack, start, stop, -1.0) / normal
+            margins[row, column, g] = margin
     for i in range(1, len(rows.torque)):
         if rows.row[i] >= 0:
             s = rows.torque[i] - abs(out.torques[row, column, i - 1])
-            least = min(least, s)
+            nearest = min(nearest, s)
             margins[row, column, rows.torque_group[i]] = s
-    return least
+    return nearest
+
+
+@compiled
+def _smallest(slack: Any, start: int, stop: int, sign: float) -> float:
+    """The smallest of these rows' slacks, or with sign -1 of what is opposite to them."""
+    found = splat(np.inf)
+    for i in range(start // WIDTH, stop // WIDTH):
+        s = sign * load(slack, i)
+        found = where_less(s, found, s, found)
+    return least(found)
 
 
 @compiled

@@ -25,7 +25,7 @@ from copsense.batch.statics.active_set import (
     relax,
 )
 from copsense.batch.statics.com_gains import com_gains, com_motions, margins
-from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
+from copsense.batch.statics.criteria import KernelCriteria
 from copsense.batch.statics.gradients import torque_gradients
 from copsense.batch.statics.inertia import factorise_inertia
 from copsense.batch.statics.kernel import Out
@@ -250,11 +250,10 @@ def _settle(
         return
     found.state[row, column] = PRESSED
     write_responses(feet, offset, limits, rows, W, lane, p, q)
-    unit = criteria.joint[index, 1] if criteria.kind[index] == LEAST_TORQUE else 1.0
     for k in range(q):
         pack.held[lane, k], pack.u[lane, k] = p.held[k], p.u[k]
         found.pressing[row, column, k] = _public(feet, rows, p.held[k])
-        found.multipliers[row, column, k] = unit * p.u[k]
+        found.multipliers[row, column, k] = criteria.unit[index] * p.u[k]
 
 
 @compiled
@@ -269,13 +268,14 @@ def _touching(
     q: int,
 ) -> int:
     """How many rows are on their bounds and do not press."""
-    touching, tolerance = 0, TOUCHING * feet.weight
+    touching, tolerance = -q, TOUCHING * feet.weight
+    rc = len(rows.bound)
     for i in range(len(p.slack)):
-        if p.slack[i] * p.inverse[i] <= tolerance:
+        if p.slack[i] * p.inverse[i] <= tolerance and (i >= rc or rows.public[i] >= 0):
             touching += 1
-            for k in range(q):
-                if held[k] == i:
-                    touching -= 1
+    for k in range(q):  # of those that press, some may be farther off
+        if p.slack[held[k]] * p.inverse[held[k]] > tolerance:
+            touching += 1
     for i in feet.rest:
         torque = get(W, offset.torque + i, lane)
         for sign in (1.0, -1.0):
@@ -289,7 +289,7 @@ def _public(feet: Feet, rows: KernelLimits, row: int) -> int:
     """A row's place in `LimitRows.all_names`."""
     rc = len(rows.bound)
     if row < rc:
-        return row
+        return rows.public[row]
     return rows.row[feet.support[(row - rc) // 2]] + (row - rc) % 2
 
 

@@ -17,8 +17,9 @@ from copsense.batch.statics.active_set import Programs, measure, release, write_
 from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
 from copsense.batch.statics.kernel_limits import KernelLimits
 from copsense.batch.statics.limit_offsets import LimitOffsets
+from copsense.batch.statics.load_sharing import own_wrenches
 from copsense.batch.statics.loops import expand, times_upper
-from copsense.batch.vectors import add3, along, cross3, dot3, load3, scale3, store3, sub3
+from copsense.batch.vectors import add3, cross3, dot3, load3
 from copsense.batch.workspace import Offsets
 
 PRESSING = 1e-9  # multipliers, relative to the largest gradient, that do not press, as in `statics`
@@ -57,15 +58,7 @@ def write_maps(
         store(W, limits.shift + j, splat(1.0))
         expand(feet, offset, W, limits.shift, offset.nothing, offset.inner)
         store(W, limits.shift + j, splat(0.0))
-        for k in range(nc):
-            F, M = load3(W, offset.inner + 6 * k), load3(W, offset.inner + 6 * k + 3)
-            own = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
-            at = limits.N + 6 * nc * j + 6 * k
-            store3(W, at, along(W, offset.foot_rotation + 9 * k, F))
-            if feet.point[k]:
-                store3(W, at + 3, scale3(0.0, F))
-            else:
-                store3(W, at + 3, along(W, offset.foot_rotation + 9 * k, own))
+        own_wrenches(feet, offset, W, offset.inner, limits.N + 6 * nc * j)
     # Times R^-1, upper triangular: the last column first, so that the others are still there.
     for j in range(r - 1, -1, -1):
         for c in range(6 * nc):
@@ -139,8 +132,6 @@ def read_program(
     for c in range(6 * nc):
         p.N[c, r] = 0.0
         p.wrench[c] = get(W, offset.contact_wrench + c, lane)
-    for i in range(rc):
-        p.inverse[i] = rows.inverse[i]
     for t in range(ns):
         p.B[t, r] = 0.0
         p.torque[t] = get(W, offset.torque + feet.support[t], lane)
@@ -159,18 +150,26 @@ def gradient_size(
     index: int,
     p: Programs,
 ) -> float:
-    """Largest entry of the cost's gradient over the contacts' wrenches, W_f f - J W_tau tau."""
-    weighted = criteria.kind[index] != LEAST_TORQUE
-    force = criteria.force[index] if weighted else 0.0
-    moment = criteria.moment[index] if weighted else 0.0
+    """Largest entry of the cost's gradient over the wrenches, W_f (f - f_ref) - J W_tau tau.
+
+    Leaves its parts, W_f (f - f_ref) and W_tau tau, in the program.
+    """
+    weights, reach = criteria.wrench[index], criteria.wrench_reach[index]
+    for i in range(len(p.now)):
+        p.push[i] = 0.0
+        for j in range(max(i - reach, 0), min(i + reach + 1, len(p.now))):
+            p.push[i] += weights[i, j] * (p.now[j] - criteria.reference[index, j])
+    weights, reach = criteria.torque[index], criteria.torque_reach[index]
+    for t in range(len(p.felt)):
+        p.strain[t] = 0.0
+        for u in range(max(t - reach, 0), min(t + reach + 1, len(p.felt))):
+            p.strain[t] += weights[t, u] * p.felt[u]
     size = 0.0
     for k in range(len(feet.body)):
         v0, v1, v2, w0, w1, w2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for t in range(len(feet.support)):
             if feet.member[feet.group[t], k]:
-                i = feet.support[t]
-                nu = p.felt[t] * (criteria.joint[index, i] if weighted else 1.0)
-                s = offset.screw + 6 * i
+                nu, s = p.strain[t], offset.screw + 6 * feet.support[t]
                 v0 += nu * get(W, s, lane)
                 v1 += nu * get(W, s + 1, lane)
                 v2 += nu * get(W, s + 2, lane)
@@ -186,10 +185,10 @@ def gradient_size(
         for e in range(3):
             a = offset.foot_rotation + 9 * k + 3 * e
             R0, R1, R2 = get(W, a, lane), get(W, a + 1, lane), get(W, a + 2, lane)
-            size = max(size, abs(force * p.now[6 * k + e] - (R0 * v0 + R1 * v1 + R2 * v2)))
+            size = max(size, abs(p.push[6 * k + e] - (R0 * v0 + R1 * v1 + R2 * v2)))
             if not feet.point[k]:
                 turned = R0 * w0 + R1 * w1 + R2 * w2
-                size = max(size, abs(moment * p.now[6 * k + 3 + e] - turned))
+                size = max(size, abs(p.push[6 * k + 3 + e] - turned))
     return max(size, 1e-300)
 
 
@@ -277,28 +276,21 @@ def violation(
     read_program(feet, offset, limits, rows, W, lane, p)
     for j in range(r):
         p.x[j] = 0.0
-    measure(rows, p, r, False)
+    new = measure(rows, p, r, False)
     size = gradient_size(feet, offset, W, lane, criteria, index, p)
     unit = feet.weight
-    worst = 0.0
+    worst = max(0.0, -p.slack[new] * p.inverse[new] / unit)
     for e in range(6):
         s = -get(W, offset.load + e, lane)
         for k in range(nc):
             s += get(W, offset.wrench + 6 * k + e, lane)
         worst = max(worst, abs(s) / unit)
-    for i in range(len(p.slack)):
-        worst = max(worst, -p.slack[i] * p.inverse[i] / unit)
-    for j in range(r):  # N' (W_f f) - B' (W_tau tau), and the rows' part below
+    for j in range(r):  # N' W_f (f - f_ref) - B' W_tau tau, and the rows' part below
         s = 0.0
-        if weighted:
-            for k in range(nc):
-                for e in range(3):
-                    c = 6 * k + e
-                    s += criteria.force[index] * p.N[c, j] * p.now[c]
-                    s += criteria.moment[index] * p.N[c + 3, j] * p.now[c + 3]
+        for c in range(6 * nc):
+            s += p.N[c, j] * p.push[c]
         for t in range(ns):
-            weight = criteria.joint[index, feet.support[t]] if weighted else 1.0
-            s -= p.B[t, j] * weight * p.felt[t]
+            s -= p.B[t, j] * p.strain[t]
         p.d[j] = s
     for k in range(q):
         write_row(rows, p, held[k], r, False)

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from copsense.batch.compiler import compiled
 from copsense.batch.lanes import load, magnitude, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
@@ -93,18 +91,16 @@ def least_squares(
     """Wrenches of least weighted torque, and of least cost where the wrenches count too."""
     ns, r = len(feet.support), feet.unknowns
     weighted = criteria.kind[index] != LEAST_TORQUE
+    free = offset.felt if weighted else offset.right
     # Torques that the held contacts alone would leave: tau_0 = G - D b.
     for t in range(ns):
         tau = load(W, offset.gravity + feet.support[t])
         for j in range(6):
             tau = tau - load(W, offset.held_row + 6 * t + j) * load(W, offset.load + j)
-        if weighted:
-            tau = tau * np.sqrt(criteria.joint[index, feet.support[t]])
-        store(W, offset.right + t, tau)
+        store(W, free + t, tau)
     Q, T, m = offset.Q, offset.T, ns
     if weighted:
-        Q, T, m = offset.Qw, offset.Tw, ns + 6 * len(feet.body)
-        _weigh(feet, offset, W, criteria, index)
+        Q, T, m = offset.Qw, offset.Tw, _weigh(feet, offset, W, criteria, index)
     for i in range(r):
         s = load(W, Q + m * i) * load(W, offset.right)
         for t in range(1, m):
@@ -115,54 +111,84 @@ def least_squares(
 
 
 @compiled
-def _weigh(feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int) -> None:
-    """The weighted loop matrix and its factors, the wrenches' rows below the torques'.
+def _weigh(feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int) -> int:
+    """The weighted loop matrix, its factors and its right-hand side; how many rows it has.
 
-    Its columns are what each unknown alone does: B = Q R again for the torques.
+    The wrenches' rows are below the torques'. Its columns are what each unknown alone does: B = Q R
+    again for the torques, of which `felt` holds tau_0.
     """
     ns, r, nc = len(feet.support), feet.unknowns, len(feet.body)
-    m = ns + 6 * nc
+    mt = ns if criteria.torque_reach[index] >= 0 else 0
+    mf = 6 * nc if criteria.wrench_reach[index] >= 0 else 0
+    m = mt + mf
+    if mt:
+        _torque_rows(W, criteria, index, offset.felt, offset.right)
+    if mf:
+        for k in range(r):
+            store(W, offset.unknown + k, splat(0.0))
+        expand(feet, offset, W, offset.unknown, offset.load, offset.inner)
+        own_wrenches(feet, offset, W, offset.inner, offset.own)
+        for i in range(6 * nc):
+            store(W, offset.own + i, criteria.reference[index, i] - load(W, offset.own + i))
+        _wrench_rows(W, criteria, index, offset.own, offset.right + mt)
     for i in range(r):
         column = offset.Qw + m * i
-        for t in range(ns):
-            s = load(W, offset.Q + t) * load(W, offset.R + i)
-            for k in range(1, i + 1):
-                s = s + load(W, offset.Q + ns * k + t) * load(W, offset.R + r * k + i)
-            store(W, column + t, s * np.sqrt(criteria.joint[index, feet.support[t]]))
-        for k in range(r):
-            store(W, offset.unknown + k, splat(1.0 if k == i else 0.0))
-        expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
-        _wrench_rows(feet, offset, W, criteria, index, offset.inner, column + ns, 1.0)
-    for k in range(r):
-        store(W, offset.unknown + k, splat(0.0))
-    expand(feet, offset, W, offset.unknown, offset.load, offset.inner)
-    _wrench_rows(feet, offset, W, criteria, index, offset.inner, offset.right + ns, -1.0)
+        if mt:
+            for t in range(ns):
+                s = load(W, offset.Q + t) * load(W, offset.R + i)
+                for k in range(1, i + 1):
+                    s = s + load(W, offset.Q + ns * k + t) * load(W, offset.R + r * k + i)
+                store(W, offset.felt + t, s)
+            _torque_rows(W, criteria, index, offset.felt, column)
+        if mf:
+            for k in range(r):
+                store(W, offset.unknown + k, splat(1.0 if k == i else 0.0))
+            expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
+            own_wrenches(feet, offset, W, offset.inner, offset.own)
+            _wrench_rows(W, criteria, index, offset.own, column + mt)
     lost = factorise(W, offset.Qw, offset.Rw, m, r)
     invert_upper(W, offset.Rw, offset.Tw, r)
     store(W, offset.doubt, where_less(lost, 0.5, load(W, offset.doubt), splat(1.0)))
+    return m
 
 
 @compiled
-def _wrench_rows(
-    feet: Feet,
-    offset: Offsets,
-    W: Any,
-    criteria: KernelCriteria,
-    index: int,
-    wrenches: int,
-    at: int,
-    sign: float,
-) -> None:
-    """sign W_f^(1/2) f of wrenches phi: forces, and moments about the contacts' own origins."""
-    force, moment = sign * np.sqrt(criteria.force[index]), sign * np.sqrt(criteria.moment[index])
+def _torque_rows(W: Any, criteria: KernelCriteria, index: int, x: int, out: int) -> None:
+    """W_tau^(1/2) of torques (ns,)."""
+    for t in range(criteria.torque_root.shape[1]):
+        s = weigh(W, criteria.torque_root[index], criteria.torque_reach[index], t, x)
+        store(W, out + t, s)
+
+
+@compiled
+def _wrench_rows(W: Any, criteria: KernelCriteria, index: int, x: int, out: int) -> None:
+    """W_f^(1/2) of wrenches in contact axes (6 nc,)."""
+    for i in range(criteria.wrench_root.shape[1]):
+        s = weigh(W, criteria.wrench_root[index], criteria.wrench_reach[index], i, x)
+        store(W, out + i, s)
+
+
+@compiled
+def weigh(W: Any, weights: Any, reach: int, i: int, x: int) -> Any:
+    """Row i of a weight matrix, which reaches so far from its diagonal, times x."""
+    s = splat(0.0)
+    for j in range(max(i - reach, 0), min(i + reach + 1, len(weights))):
+        s = s + weights[i, j] * load(W, x + j)
+    return s
+
+
+@compiled
+def own_wrenches(feet: Feet, offset: Offsets, W: Any, wrenches: int, out: int) -> None:
+    """Wrenches of all contacts about their own origins, in their own axes."""
     for k in range(len(feet.body)):
         F, M = load3(W, wrenches + 6 * k), load3(W, wrenches + 6 * k + 3)
-        store3(W, at + 6 * k, scale3(force, F))
+        f = along(W, offset.foot_rotation + 9 * k, F)
+        m = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
+        m = along(W, offset.foot_rotation + 9 * k, m)
         if feet.point[k]:
-            store3(W, at + 6 * k + 3, scale3(0.0, F))
-        else:
-            own = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
-            store3(W, at + 6 * k + 3, scale3(moment, own))
+            m = scale3(0.0, f)
+        store3(W, out + 6 * k, f)
+        store3(W, out + 6 * k + 3, m)
 
 
 @compiled
@@ -176,17 +202,12 @@ def finish(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
         s = offset.screw + 6 * i
         power = dot3(load3(W, s), load3(W, g)) + dot3(load3(W, s + 3), load3(W, g + 3))
         store(W, offset.torque + i, load(W, offset.gravity + i) - power)
+    own_wrenches(feet, offset, W, offset.wrench, offset.contact_wrench)
     doubt = load(W, offset.doubt)
     for k in range(len(feet.body)):
-        F, M = load3(W, offset.wrench + 6 * k), load3(W, offset.wrench + 6 * k + 3)
-        f = along(W, offset.foot_rotation + 9 * k, F)
-        m = sub3(M, cross3(load3(W, offset.foot + 3 * k), F))
-        m = along(W, offset.foot_rotation + 9 * k, m)
-        if feet.point[k]:
-            m = scale3(0.0, f)
-        store3(W, offset.contact_wrench + 6 * k, f)
-        store3(W, offset.contact_wrench + 6 * k + 3, m)
-        store(W, offset.cop + 2 * k, -(m[1] / f[2]))
-        store(W, offset.cop + 2 * k + 1, m[0] / f[2])
-        doubt = where_less(_UNLOADED * feet.weight, magnitude(f[2]), doubt, splat(1.0))
+        f, m = offset.contact_wrench + 6 * k, offset.contact_wrench + 6 * k + 3
+        normal = load(W, f + 2)
+        store(W, offset.cop + 2 * k, -(load(W, m + 1) / normal))
+        store(W, offset.cop + 2 * k + 1, load(W, m) / normal)
+        doubt = where_less(_UNLOADED * feet.weight, magnitude(normal), doubt, splat(1.0))
     store(W, offset.doubt, doubt)
