@@ -35,6 +35,7 @@ from copsense.batch.statics.limit_outputs import LimitOut, begin_row, row_margin
 from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNLOADED
 from copsense.batch.statics.limited_statics import (
     TOUCHING,
+    Within,
     gradient_size,
     keep_pressing,
     move_unknowns,
@@ -103,6 +104,7 @@ def limit_postures(
         Whether any of them is in doubt, or has no answer.
     """
     offset, limits = _offsets(offsets), _limit_offsets(limit_offsets)
+    at = Within(feet, offset, limits, rows, criteria, W, p)
     doubt, waiting = False, 0
     moving, gains = feet.held == 1, len(out.com_gain) > 0
     for row in range(start, stop):
@@ -146,9 +148,7 @@ def limit_postures(
                 row = pack.queue[first + lane]
                 pack.pressed[lane] = -1
                 if pack.candidate[row - start, index]:
-                    _settle(
-                        feet, offset, limits, rows, W, lane, row, criteria, index, p, pack, found
-                    )
+                    _settle(at, lane, row, index, pack, found)
                     if pack.pressed[lane] > 0:
                         some = True
                     elif pack.pressed[lane] < -1:
@@ -166,15 +166,13 @@ def limit_postures(
                 com_gains(feet, offset, W, nv)
             margins(feet, offset, W, gains)
             for output in range(2 * len(feet.body)):
-                at = offset.gradient + nv * output
-                store3(W, at, along(W, offset.rotation, load3(W, at)))
-                store3(W, at + 3, along(W, offset.rotation, load3(W, at + 3)))
+                base = offset.gradient + nv * output
+                store3(W, base, along(W, offset.rotation, load3(W, base)))
+                store3(W, base + 3, along(W, offset.rotation, load3(W, base + 3)))
             for lane in range(count):
                 if pack.pressed[lane] > 0:
                     row, column = pack.queue[first + lane], criteria.column[index]
-                    good = _conclude(
-                        feet, offset, limits, rows, W, lane, row, criteria, index, p, pack, found
-                    )
+                    good = _conclude(at, lane, row, index, pack, found)
                     write_lane(feet, offset, W, lane, row, column, out, nv, gains)
                     row_margins(feet, rows, out, found.margins, p.slack, row, column)
                     if not good:
@@ -184,26 +182,14 @@ def limit_postures(
 
 
 @compiled
-def _settle(
-    feet: Feet,
-    offset: Offsets,
-    limits: LimitOffsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    row: int,
-    criteria: KernelCriteria,
-    index: int,
-    p: Programs,
-    pack: Pack,
-    found: LimitOut,
-) -> None:
+def _settle(at: Within, lane: int, row: int, index: int, pack: Pack, found: LimitOut) -> None:
     """The active set of one posture, into its lane; `pack.pressed` is -2 if it was not found."""
+    feet, offset, limits, rows, criteria, W, p = at
     r, column = feet.unknowns, criteria.column[index]
     pack.pressed[lane] = -2
     if get(W, limits.lost, lane) != 0.0:
         return
-    read_program(feet, offset, limits, rows, W, lane, p)
+    read_program(at, lane)
     most, fixed = 0.0, -1
     for i in feet.rest:  # torques that no wrench changes
         over = abs(get(W, offset.torque + i, lane)) - rows.torque[i]
@@ -241,15 +227,15 @@ def _settle(
         return
     optimum(p, r, q)
     measure(rows, p, r, False)
-    size = gradient_size(feet, offset, W, lane, criteria, index, p)
+    size = gradient_size(at, lane, index)
     q = keep_pressing(p, r, q, size)
-    found.touching[row, column] = _touching(feet, offset, rows, W, lane, p, p.held, q)
+    found.touching[row, column] = _touching(at, lane, p.held, q)
     pack.pressed[lane] = q
     if q == 0:
         pack.pressed[lane] = -1
         return
     found.state[row, column] = PRESSED
-    write_responses(feet, offset, limits, rows, W, lane, p, q)
+    write_responses(at, lane, q)
     for k in range(q):
         pack.held[lane, k], pack.u[lane, k] = p.held[k], p.u[k]
         found.pressing[row, column, k] = _public(feet, rows, p.held[k])
@@ -257,17 +243,9 @@ def _settle(
 
 
 @compiled
-def _touching(
-    feet: Feet,
-    offset: Offsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    p: Programs,
-    held: Any,
-    q: int,
-) -> int:
+def _touching(at: Within, lane: int, held: Any, q: int) -> int:
     """How many rows are on their bounds and do not press."""
+    feet, offset, _limits, rows, _criteria, W, p = at
     touching, tolerance = -q, TOUCHING * feet.weight
     rc = len(rows.bound)
     for i in range(len(p.slack)):
@@ -294,36 +272,11 @@ def _public(feet: Feet, rows: KernelLimits, row: int) -> int:
 
 
 @compiled
-def _conclude(
-    feet: Feet,
-    offset: Offsets,
-    limits: LimitOffsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    row: int,
-    criteria: KernelCriteria,
-    index: int,
-    p: Programs,
-    pack: Pack,
-    found: LimitOut,
-) -> bool:
+def _conclude(at: Within, lane: int, row: int, index: int, pack: Pack, found: LimitOut) -> bool:
     """Verify an optimum, as it came out; note contacts without load. Whether it can be believed."""
+    feet, offset, limits, _rows, criteria, W, p = at
     column, q = criteria.column[index], pack.pressed[lane]
-    error = violation(
-        feet,
-        offset,
-        limits,
-        rows,
-        W,
-        lane,
-        criteria,
-        index,
-        p,
-        pack.held[lane],
-        pack.u[lane],
-        q,
-    )
+    error = violation(at, lane, index, pack.held[lane], pack.u[lane], q)
     found.optimality[row, column] = error
     if get(W, offset.doubt, lane) != 0.0:
         if get(W, limits.lost, lane) != 0.0:

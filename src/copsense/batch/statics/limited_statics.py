@@ -6,7 +6,7 @@ wrenches and torques; then each its own active set; then all abreast what follow
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,28 @@ from copsense.batch.workspace import Offsets
 
 PRESSING = 1e-9  # multipliers, relative to the largest gradient, that do not press, as in `statics`
 TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound, likewise
+
+
+class Within(NamedTuple):
+    """What the functions for one posture of those abreast work with.
+
+    Attributes:
+        feet: the contacts.
+        offset: of the workspace's blocks.
+        limits: of those that the limited kernel adds.
+        rows: the limits.
+        criteria: the criteria.
+        W: the workspace.
+        p: memory of a program.
+    """
+
+    feet: Feet
+    offset: Offsets
+    limits: LimitOffsets
+    rows: KernelLimits
+    criteria: KernelCriteria
+    W: Any
+    p: Programs
 
 
 @compiled
@@ -111,16 +133,9 @@ def move_unknowns(
 
 
 @compiled
-def read_program(
-    feet: Feet,
-    offset: Offsets,
-    limits: LimitOffsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    p: Programs,
-) -> None:
+def read_program(at: Within, lane: int) -> None:
     """One posture's program, from its lane."""
+    feet, offset, limits, rows, _criteria, W, p = at
     ns, r, nc = len(feet.support), feet.unknowns, len(feet.body)
     rc = len(rows.bound)
     for j in range(r):
@@ -141,19 +156,12 @@ def read_program(
 
 
 @compiled
-def gradient_size(
-    feet: Feet,
-    offset: Offsets,
-    W: Any,
-    lane: int,
-    criteria: KernelCriteria,
-    index: int,
-    p: Programs,
-) -> float:
+def gradient_size(at: Within, lane: int, index: int) -> float:
     """Largest entry of the cost's gradient over the wrenches, W_f (f - f_ref) - J W_tau tau.
 
     Leaves its parts, W_f (f - f_ref) and W_tau tau, in the program.
     """
+    feet, offset, _limits, _rows, criteria, W, p = at
     weights, reach = criteria.wrench[index], criteria.wrench_reach[index]
     for i in range(len(p.now)):
         p.push[i] = 0.0
@@ -203,17 +211,9 @@ def keep_pressing(p: Programs, n: int, q: int, size: float) -> int:
 
 
 @compiled
-def write_responses(
-    feet: Feet,
-    offset: Offsets,
-    limits: LimitOffsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    p: Programs,
-    q: int,
-) -> None:
+def write_responses(at: Within, lane: int, q: int) -> None:
     """Into a lane: x, what the pressing rows leave, and how their multipliers answer."""
+    feet, offset, limits, rows, _criteria, W, p = at
     r, rc = feet.unknowns, len(rows.bound)
     held = feet.order[0]
     for i in range(r):
@@ -253,31 +253,19 @@ def write_responses(
 
 
 @compiled
-def violation(
-    feet: Feet,
-    offset: Offsets,
-    limits: LimitOffsets,
-    rows: KernelLimits,
-    W: Any,
-    lane: int,
-    criteria: KernelCriteria,
-    index: int,
-    p: Programs,
-    held: Any,
-    u: Any,
-    q: int,
-) -> float:
+def violation(at: Within, lane: int, index: int, held: Any, u: Any, q: int) -> float:
     """Largest violation of an optimality condition, as `Program.violation`, of what came out.
 
     Leaves the rows' slack in the program. The stationarity is taken along the internal wrenches.
     """
+    feet, offset, _limits, rows, criteria, W, p = at
     r, ns, nc = feet.unknowns, len(feet.support), len(feet.body)
     weighted = criteria.kind[index] != LEAST_TORQUE
-    read_program(feet, offset, limits, rows, W, lane, p)
+    read_program(at, lane)
     for j in range(r):
         p.x[j] = 0.0
     new = measure(rows, p, r, False)
-    size = gradient_size(feet, offset, W, lane, criteria, index, p)
+    size = gradient_size(at, lane, index)
     unit = feet.weight
     worst = max(0.0, -p.slack[new] * p.inverse[new] / unit)
     for e in range(6):
