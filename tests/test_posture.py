@@ -7,7 +7,8 @@ from support.differences import largest_error
 from support.grounds import off_centre, on_tilted_planes, with_hand
 
 import copsense
-from copsense.posture import contact_error, supporting_joints
+from copsense.posture import contact_error
+from copsense.posture_system import supporting_joints
 
 MET = 1e-12  # m, rad
 COST = copsense.posture.PostureCost(base_rotation=7.0, supporting=2.0, free=11.0)

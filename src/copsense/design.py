@@ -23,7 +23,7 @@ from copsense.json_data import json_data
 from copsense.limits import Limits, check_limits
 from copsense.margins import margin_table
 from copsense.path import PosturePath, check_path
-from copsense.posture import supporting_joints
+from copsense.posture_system import supporting_joints
 from copsense.scan import PathScan
 from copsense.scan_point import ScanPoint
 from copsense.stance import Stance

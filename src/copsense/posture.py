@@ -14,37 +14,26 @@ from copsense.arrays import check_type, checked_positions, finite_array, finite_
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
+from copsense.posture_system import (
+    PostureCost as PostureCost,
+)
+from copsense.posture_system import (
+    bordered,
+    cost_derivatives,
+    followed_tangents,
+    independent_rows,
+    posture_weights,
+    solve_bordered,
+)
 from copsense.reach import beyond_reach
-from copsense.stance import RANK_TOLERANCE, Stance, check_at_rest, check_stance
+from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.unheld import moved_joints
 
 TOLERANCE = 1e-12  # on every constraint [m, rad]
 _STATIONARITY = 1e-11  # on the cost's gradient along the manifold
 _NEWTON_REGION = 1e-2  # constraint error under which the exact curvature is used
-_PIVOT = 3e-6  # of the constraints' Cholesky factor, relative, from which they are independent
 _LONGEST_STEP = 0.3  # rad or m: longer Newton steps are shortened
-_RUNAWAY = 1e3  # rad or m, per unit requested, of a motion that is held but for rounding
 _MAX_ITERATIONS = 100
-
-
-@dataclass(frozen=True)
-class PostureCost:
-    """What a posture minimises, 1/2 sum w (deviation from the reference)^2, the base free to move.
-
-    Attributes:
-        base_rotation: weight of the base's rotation vector [1/rad^2].
-        supporting: weight of each joint between a contact and the base.
-        free: weight of every other joint, such as torso and arms.
-    """
-
-    base_rotation: float = 10.0
-    supporting: float = 1.0
-    free: float = 20.0
-
-    def __post_init__(self) -> None:
-        """Reject a weight that would leave a joint undetermined."""
-        for name in ("base_rotation", "supporting", "free"):
-            finite_number(getattr(self, name), f"the posture weight {name}", positive=True)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,7 +115,7 @@ def solve_posture(
         finite_array(place.homogeneous, f"the target of contact {contact.name!r}", (4, 4))
     home = stance.q if reference is None else robot.check_configuration(reference)
     columns = [robot.velocity_index(joint) for joint in joints]
-    weights = _weights(stance, cost)
+    weights = posture_weights(stance, cost)
     selector = np.eye(robot.model.nv)[columns]
     axes = [i for i, _ in wanted]
 
@@ -143,8 +132,8 @@ def solve_posture(
         )
         swing = here.hanging_derivative / robot.weight
         C = np.vstack([here.constraints, swing, here.com_jacobian[axes], selector])
-        A, errors, spread = _independent(here, C, h)
-        gradient, hessian = _cost_derivatives(here, home, weights)
+        A, errors, spread = independent_rows(here, C, h)
+        gradient, hessian = cost_derivatives(here, home, weights)
         if multipliers is None or spread is not None or len(multipliers) != len(A):
             multipliers = np.linalg.lstsq(A.T, -gradient, rcond=1e-10)[0]
         stationarity = gradient + A.T @ multipliers
@@ -158,16 +147,16 @@ def solve_posture(
             start = rows + len(swing)
             pull[axes] = of_h[start : start + len(axes)]
             hessian = hessian + here.curvature(-of_h[:rows], -pull / robot.mass)
-        K = _bordered(hessian, A)
+        K = bordered(hessian, A)
         if small < TOLERANCE / 5 and np.abs(stationarity).max() < _STATIONARITY:
             # Rates of h: one for each request, and none of what is held to second order only.
             requests = len(axes) + len(columns)
             rate = np.zeros((len(h) if spread is None else len(spread), requests))
             rate[len(h) - requests : len(h)] = np.eye(requests)
-            tangents, followed = _tangents(here, K, C, rate, spread)
+            tangents, followed = followed_tangents(here, K, C, rate, spread)
             tangents[:, ~followed] = 0.0
             return Posture(stance.at(here.q), tangents, iteration)
-        step = _solve(K, -np.concatenate([stationarity, errors]))
+        step = solve_bordered(K, -np.concatenate([stationarity, errors]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
         before = here
         here = here.at(
@@ -198,13 +187,13 @@ def contact_motions(
     axes = [0, 1] if stance.robot.base_nv == 6 else [1]
     swing = stance.hanging_derivative / stance.robot.weight
     C = np.vstack([stance.constraints, swing, stance.com_jacobian[axes]])
-    A, _, spread = _independent(stance, C, np.zeros(len(C)))
+    A, _, spread = independent_rows(stance, C, np.zeros(len(C)))
     m = len(stance.row_names)
     rate = np.zeros((len(C) if spread is None else len(spread), m))
     rate[:m] = np.eye(m)
     # At its own reference no constraint has a multiplier, so that none curves the cost.
-    K = _bordered(np.diag(_weights(stance, PostureCost())), A)
-    tangents, followed = _tangents(stance, K, C, rate, spread)
+    K = bordered(np.diag(posture_weights(stance, PostureCost())), A)
+    tangents, followed = followed_tangents(stance, K, C, rate, spread)
     tangents[:, ~followed] = 0.0
     return tangents, followed
 
@@ -343,106 +332,6 @@ def _carried(multipliers: np.ndarray, before: Stance, after: Stance) -> np.ndarr
     k = r + before.hanging_motions.shape[1]
     swing = after.hanging_motions.T @ (before.hanging_motions @ multipliers[r:k])
     return np.concatenate([multipliers[:m], own, swing, multipliers[k:]])
-
-
-def supporting_joints(stance: Stance) -> Float[np.ndarray, " nv"]:
-    """1 for every velocity between a contact and the base, 0 elsewhere (base: 0)."""
-    mask = np.zeros(stance.robot.model.nv)
-    for contact in stance.contacts:
-        for joint in stance.limb(contact):
-            model_joint = stance.robot.model.joints[joint]
-            mask[model_joint.idx_v : model_joint.idx_v + model_joint.nv] = 1.0
-    return mask
-
-
-def _weights(stance: Stance, cost: PostureCost) -> Float[np.ndarray, " nv"]:
-    """Weight of each velocity; none on the base's position, so that the feet decide it."""
-    mask = supporting_joints(stance)
-    weights = np.where(mask > 0, cost.supporting, cost.free)
-    if stance.robot.base_nv == 6:
-        weights[:3], weights[3:6] = 0.0, cost.base_rotation
-    else:
-        weights[:2], weights[2] = 0.0, cost.base_rotation
-    return weights
-
-
-def _cost_derivatives(
-    stance: Stance, home: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient of 1/2 w |deviation|^2 in the base's frame, and that gradient's derivative."""
-    model = stance.robot.model
-    deviation = pin.difference(model, home, stance.q)
-    hessian = np.diag(weights)
-    if stance.robot.base_nv == 6:
-        # r = log(R_home' R): its gradient is r itself (r is an eigenvector of the log's
-        # Jacobian), whose derivative is that Jacobian.
-        relative = pin.Quaternion(home[3:7]).matrix().T @ pin.Quaternion(stance.q[3:7]).matrix()
-        deviation[3:6] = pin.log3(relative)
-        hessian[3:6, 3:6] = weights[3] * pin.Jlog3(relative)
-    return weights * deviation, hessian
-
-
-def _bordered(hessian: np.ndarray, A: np.ndarray) -> np.ndarray:
-    """[H A'; A 0]; written out, for `np.block` takes longer than the equations."""
-    n = len(hessian)
-    K = np.zeros((n + len(A), n + len(A)))
-    K[:n, :n] = hessian
-    K[n:, :n] = A
-    K[:n, n:] = A.T
-    return K
-
-
-def _independent(
-    here: Stance, C: np.ndarray, h: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """Equations A dq = -e that say what C dq = -h says, without what it says twice.
-
-    Returns:
-        A, e, and U with A = U' [C; F], where F are the stance's fold equations; where the rows of
-        C are independent, C, h and None.
-    """
-    try:
-        pivots = np.linalg.cholesky(C @ C.T).diagonal()
-        if len(pivots) and pivots.min() > _PIVOT * pivots.max():
-            return C, h, None
-    except np.linalg.LinAlgError:
-        pass
-    rows, errors = here.fold_equations
-    u, s, _ = np.linalg.svd(np.vstack([C, rows]), full_matrices=False)
-    spread = u[:, s > RANK_TOLERANCE * max(1.0, s[0])]
-    return spread.T @ np.vstack([C, rows]), spread.T @ np.concatenate([h, errors]), spread
-
-
-def _tangents(
-    here: Stance, K: np.ndarray, C: np.ndarray, rate: np.ndarray, spread: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """dq for rates of C q, or of [C; F] where there is a spread, and which can be followed."""
-    nv = here.robot.model.nv
-    right = np.zeros((len(K), rate.shape[1]))
-    right[nv:] = rate if spread is None else spread.T @ rate
-    tangents = _solve(K, right)[:nv]
-    # What the contacts hold fast has no tangent: least squares would move a contact.
-    whole = C if spread is None else np.vstack([C, here.fold_equations[0]])
-    missed = np.abs(whole @ tangents - rate).max(axis=0, initial=0.0)
-    fastest = np.abs(tangents).max(axis=0, initial=1.0)
-    runs_away = (fastest > _RUNAWAY) & (spread is not None)
-    return tangents, ~((missed > 1e-6 * fastest) | runs_away)
-
-
-def _solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve, or take the minimum-norm least squares where constraints are redundant."""
-    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
-        raise UnreachablePostureError(
-            "the search for a posture left all bounds: numbers of the model are too large or too "
-            "small for it. Check its lengths [m], masses [kg] and angles [rad]."
-        )
-    try:
-        solution = np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError:
-        solution = np.full(right.shape, np.inf)
-    if np.all(np.abs(solution) < 1e9):
-        return np.asarray(solution)
-    return np.asarray(np.linalg.lstsq(matrix, right, rcond=1e-12)[0])
 
 
 def _what_remains(
