@@ -115,6 +115,8 @@ def inertial_regressor(
     robot: Robot,
     q: Float[np.ndarray, " nq"],
     acceleration: Float[np.ndarray, " nv"] | None = None,
+    *,
+    gravity: Float[np.ndarray, " 3"] | None = None,
 ) -> Float[np.ndarray, "nv k"]:
     """Y with G + M a = Y pi, pi the links' inertial parameters (10 (njoints - 1),).
 
@@ -125,10 +127,12 @@ def inertial_regressor(
         robot: the robot.
         q: configuration (nq,).
         acceleration: a (nv,); None at rest.
+        gravity: another gravity than the model's (3,) [m/s^2].
     """
     memory = _scratch(robot)
     a = memory.still if acceleration is None else acceleration
-    return owned(pin.computeJointTorqueRegressor(memory.model, memory.data, q, memory.still, a))
+    model = memory.model if gravity is None else memory.tilted(gravity)
+    return owned(pin.computeJointTorqueRegressor(model, memory.data, q, memory.still, a))
 
 
 def com(robot: Robot, q: Float[np.ndarray, " nq"]) -> Float[np.ndarray, " 3"]:

@@ -19,6 +19,7 @@ from copsense import plots
 from copsense.controllers.target import Sine
 from copsense.design import families
 from copsense.errors import InvalidInputError
+from copsense.hardware import hardware_effects, hardware_sweep
 from copsense.logs import compare_log
 from copsense.maps import Marginal
 from copsense.optimisation import optimise, pareto_front
@@ -98,6 +99,10 @@ def drawn(request, icub, swept, found, compared, run):
         if name == "plot_front":
             return (pareto_front(icub, ("gain", "torque"), points=2, **quick),), 1, "before"
         return (optimise(icub, objective="torque", **quick),), 4, TORQUE.name
+    if name.startswith("plot_hardware"):
+        effects = hardware_effects(bar, TORQUE)
+        hips = hardware_sweep(bar, TORQUE, "hip_width", [0.1, 0.12, 1.4], nominal=effects)
+        return ((hips,), 1, "smallest") if "sweep" in name else ((effects, [hips]), 2, TORQUE.name)
     if name == "plot_pushes":
         return (push_limits(icub, criteria=[TORQUE]),), 1, TORQUE.name
     if name == "plot_regions":

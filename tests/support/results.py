@@ -20,6 +20,8 @@ from copsense.explore import Model, Setting, State
 from copsense.explore.export import played_views
 from copsense.explore.played_model import PlayedModel
 from copsense.explore.shape import JointMesh
+from copsense.hardware import hardware_effects, hardware_sweep
+from copsense.hardware.stance_rates import HardwareRates
 from copsense.identification import Measurements, identify
 from copsense.labelled import LabelledResult
 from copsense.limits import limit_rows
@@ -114,6 +116,8 @@ def all_results(icub) -> dict[str, object]:
     chart = PostureChart(bar, ["com_y"])
     kernel = BatchKernel(bar, [TORQUE])
     explored = Model(icub)
+    buys = hardware_effects(bar, TORQUE, checked=1)
+    shapes = HardwareRates(bar, buys.parameters)
     shown = explored.view(State(limits=copsense.Limits(), overlays=frozenset({"regions"})))
     log = small_log(icub)
     swaying_views = played_views(PlayedModel(align_log(log, icub).run(log)), explored.start, [0, 5])
@@ -170,6 +174,10 @@ def all_results(icub) -> dict[str, object]:
         **{f"family {name}": family for name, family in families(icub).items()},
         "optimum": copsense.optimise(bar, over={"com_y": 0.02}, starts=1),
         "front": pareto_front(bar, ("travel", "torque"), over={"com_y": 0.02}, points=2, starts=1),
+        "hardware": buys,
+        "sweep of hardware": hardware_sweep(bar, TORQUE, "hip_width", [0.15], nominal=buys),
+        "rates of hardware": shapes,
+        "change of hardware": shapes.change_at(bar),
         "sweep": copsense.sweep(path, [TORQUE]),
         "prediction": predict(lateral_reference(icub, Hold()), TORQUE),
         "prediction of a sway": predict(lateral_reference(icub, Sine(2e-3, 0.5)), TORQUE),

@@ -24,6 +24,7 @@ from copsense.plots.curve_plots import (
     plot_travel,
 )
 from copsense.plots.design_plots import plot_design
+from copsense.plots.hardware_plots import plot_hardware, plot_hardware_sweep
 from copsense.plots.limit_plots import plot_limit_margins, plot_limited, plot_regions
 from copsense.plots.log_plots import plot_log
 from copsense.plots.map_plots import plot_map
@@ -43,6 +44,8 @@ __all__ = [
     "plot_design",
     "plot_foot_cop",
     "plot_front",
+    "plot_hardware",
+    "plot_hardware_sweep",
     "plot_limit_margins",
     "plot_limited",
     "plot_load",

@@ -28,17 +28,21 @@ from copsense.uncertainty.source_list import link_names
 _SPAN = 0.5  # of a coefficient of friction, in which rows of the pyramid are affine
 
 
-def check_uncertain(stance: Stance) -> None:
+def check_uncertain(stance: Stance, what: str = "an uncertainty") -> None:
     """Reject a stance of which these derivatives are not known.
+
+    Args:
+        stance: the stance.
+        what: what changes it, such as ``"an uncertainty"``.
 
     Raises:
         InvalidInputError: it moves, or parts of it hang, which follow what is uncertain.
     """
-    check_at_rest(stance, "an uncertainty")
+    check_at_rest(stance, what)
     if stance.hanging_motions.shape[1]:
         raise InvalidInputError(
-            f"parts of robot {stance.robot.name!r} hang at an equilibrium of their own, which an "
-            "uncertainty moves: that is not worked out here. Give every joint a motor, or lock it."
+            f"parts of robot {stance.robot.name!r} hang at an equilibrium of their own, which "
+            f"{what} moves: that is not worked out here. Give every joint a motor, or lock it."
         )
 
 
