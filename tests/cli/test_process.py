@@ -17,7 +17,7 @@ from copsense.cli.option_lists import SECTIONS
 ENTRY = "from copsense.cli import main; main()"
 COMMANDS = (
     "robots", "inspect", "analyse", "explore", "sweep", "plot", "map", "push", "design",
-    "optimise", "balance", "log", "identify", "benchmark", "four-bar", "reproduce",
+    "optimise", "hardware", "balance", "log", "identify", "benchmark", "four-bar", "reproduce",
 )  # fmt: skip
 HEAVY = {
     "numpy", "pinocchio", "scipy", "xarray", "pandas", "matplotlib", "jinja2", "netCDF4", "mujoco",

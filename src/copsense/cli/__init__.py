@@ -32,6 +32,7 @@ _COMMANDS = {
         ("push", "push", "Push a robot that stands: how hard, from where, and what yields first."),
         ("design", "design", "Design the weights of a criterion that goes farther."),
         ("optimise", "optimise", "Optimise the posture: travel, margins, pushes, gain or torques."),
+        ("hardware", "hardware", "Say which millimetre or gram of a robot buys most travel."),
         ("balance", "balance", "Balance a robot in simulation, beside the static prediction."),
         ("log", "log", "Compare a robot's own log with what every criterion says."),
         ("identify", "identify", "Identify which criterion explains a robot's own log."),
