@@ -42,6 +42,7 @@ def test_an_example_asserts_a_number_and_draws(example):
         "docs/adding.md",
         "docs/balancing.md",
         "docs/explore.md",
+        "docs/hardware.md",
         "docs/logs.md",
         "docs/maps.md",
         "docs/optimise.md",
