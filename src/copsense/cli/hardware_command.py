@@ -9,6 +9,7 @@ import click
 
 from copsense.cli.criterion_options import one_criterion_options, read_criterion
 from copsense.cli.limit_options import read_limits
+from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written, progress_bar
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.units import Unit, read_quantity, split_assignment
@@ -30,12 +31,13 @@ _COUNT, _MOST = 9, 1000
 
 
 @click.command(
+    cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense hardware icub --plot effects.png\n"
     "  copsense hardware icub --change sole_width=80mm:120mm --change hip_width=+-20mm\n"
     "  copsense hardware talos --limits friction=0.4,torque=model --output talos.csv\n"
     "  copsense hardware solo12 --single --json\n"
-    "  copsense hardware icub --criterion stiffness:hip=4000,rest=2000 --step 20%"
+    "  copsense hardware icub --criterion stiffness:hip=4000,rest=2000 --step 20%",
 )
 @partial(stance_options, coordinates=False)
 @one_criterion_options

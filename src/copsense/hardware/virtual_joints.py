@@ -84,9 +84,10 @@ class VirtualJoints(ShortRepr):
         made.armature = armature
         columns = np.zeros((made.nv, len(alterations)))
         for i, change in enumerate(alterations):
-            moves: dict[int | str, np.ndarray] = {**change.joints, **change.contacts}
-            for key, d in moves.items():
-                start = made.joints[at[key]].idx_v
+            moves = [(at[joint], d) for joint, d in change.joints.items()]
+            moves += [(at[contact], d) for contact, d in change.contacts.items()]
+            for joint, d in moves:
+                start = made.joints[joint].idx_v
                 columns[start : start + 3, i] = d
         whole = replace(robot, model=made)
         return cls(whole, tuple(contacts), q_index, v_index, columns)
