@@ -92,6 +92,12 @@ package: $(DEV_STAMP) ## build sdist and wheel into dist; try them and the repos
 	$(BIN)/zizmor --offline --quiet .github
 	$(BIN)/python tools/try_wheel.py
 
+BASE ?= HEAD~1
+.PHONY: history
+history: $(DEV_STAMP) ## what a posture costs here and at the commit BASE, as ratios
+	@$(BIN)/python -m pip install --quiet --quiet --disable-pip-version-check --group history
+	$(BIN)/python benchmarks/history.py $(BASE)
+
 .PHONY: venv
 venv: $(DEV_STAMP) ## set .venv up for development
 

@@ -135,6 +135,14 @@ def with_gains(
     return np.array([c.com_gain for c in found]), np.array([c.com_travel for c in found])
 
 
+def script_with_gains(stance: copsense.Stance) -> Callable[[np.ndarray], Any]:
+    """The plain script for CoM gains and travels of both criteria."""
+    soles = [contact.sole for contact in stance.contacts]
+    return contenders.analytic_with_gains(
+        stance.robot.model, FEET, [(sole.normals, sole.offsets) for sole in soles]
+    )
+
+
 def reference_path(stance: copsense.Stance, q: np.ndarray) -> dict[str, np.ndarray]:
     """The reference path's answer at one configuration."""
     at = stance.at(q)
@@ -193,10 +201,7 @@ def compare(options: argparse.Namespace, progress: Callable[[str], None]) -> dic
     answers = [reference_path(stance, row) for row in q[:32]]
     wrong[name] = check(name, stacked(answers), expected, EXACT)
     runs[name] = per_posture(lambda row: reference_path(stance, row), q[:16])
-    soles = [contact.sole for contact in stance.contacts]
-    script = contenders.analytic_with_gains(
-        model, FEET, [(sole.normals, sole.offsets) for sole in soles]
-    )
+    script = script_with_gains(stance)
     runs[SCRIPT] = per_posture(script, q[:16])
     runs[REFERENCE] = per_posture(lambda row: with_gains(stance, row), q[:16])
     # Only postures that have an equilibrium within the limits: near standing.

@@ -1,0 +1,1 @@
+"""What asv records of a commit: see `posture`, and `benchmarks/history.py`, which runs it."""
