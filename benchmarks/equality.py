@@ -32,7 +32,7 @@ from copsense.batch.statics import batch_kernel
 from copsense.errors import InvalidInputError
 from copsense.limits import limit_rows
 from copsense.load_problem import LoadProblem
-from copsense.posture import supporting_joints
+from copsense.posture_system import supporting_joints
 
 ALLOWED = 1e-9
 WHAT = ("wrenches", "torques", "cops", "gradient", "com_gain", "com_travel", "tipping_edge")

@@ -23,7 +23,7 @@ from map import RANGES
 
 import copsense
 from copsense.batch import BatchKernel, PostureChart
-from copsense.posture import supporting_joints
+from copsense.posture_system import supporting_joints
 
 ROUNDS = 9
 COUNT = 16384

@@ -4,7 +4,7 @@ import numpy as np
 
 import copsense
 from copsense.criterion import TorqueTerm, WrenchTerm, reference_wrench
-from copsense.posture import supporting_joints
+from copsense.posture_system import supporting_joints
 from support.grounds import off_centre, on_tilted_planes, with_hand
 
 WRENCH, TORQUE = copsense.minimum_wrench(0.7), copsense.minimum_torque()

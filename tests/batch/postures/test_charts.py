@@ -10,7 +10,8 @@ from support.walkers import BIPED, FULL, NO_ANKLE_ROLL, PITCH_ONLY, bent, walker
 
 import copsense
 from copsense.batch import PostureChart, coordinate_names, evaluate_batch
-from copsense.posture import contact_error, supporting_joints
+from copsense.posture import contact_error
+from copsense.posture_system import supporting_joints
 
 MET = 1e-10  # m, rad
 POSE = ("base_x", "base_y", "base_z", "roll", "pitch", "yaw")
