@@ -45,6 +45,14 @@ def test_a_notebook_draws_a_stance_in_a_cell(icub, tmp_path):
         assert not [u for u in page.requested if u.startswith("http")]
 
 
+def test_nothing_but_the_picture_lands_in_a_notebook(icub, monkeypatch, capsys):
+    said = []
+    monkeypatch.setattr("rich.print", lambda *words, **_: said.append(words))
+    icub.show()
+    assert said == []  # in a notebook rich displays; it writes to no standard output
+    assert capsys.readouterr().out == ""
+
+
 def test_an_analysis_shows_its_own_criteria_and_posture(icub):
     limits = copsense.Limits(friction=0.5)
     analysis = copsense.analyse(icub, [OWN], limits, com_y=0.02)

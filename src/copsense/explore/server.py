@@ -179,6 +179,9 @@ def _is_loopback(host: str) -> bool:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep viser's banner out of standard output, which may be JSON."""
-    with contextlib.redirect_stdout(io.StringIO()):
+    """Keep viser's banner out of standard output, which may be JSON, and out of notebooks.
+
+    There rich, which viser prints with, does not write to standard output.
+    """
+    with contextlib.redirect_stdout(io.StringIO()), patch("rich.print", lambda *_, **__: None):
         yield
