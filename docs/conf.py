@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging as standard_logging
-import os
 import re
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -16,8 +16,7 @@ from sphinx.util import logging
 from sphinx.writers.html5 import HTML5Translator
 from sphinx_gallery.sorting import ExplicitOrder
 
-os.environ["MPLBACKEND"] = "agg"
-for noisy in ("websockets", "OpenGL.acceleratesupport"):  # of pages in 3-D, and of MuJoCo
+for noisy in ("websockets", "OpenGL.acceleratesupport", "traitlets"):  # of 3-D, MuJoCo, notebooks
     standard_logging.getLogger(noisy).setLevel("WARNING")
 
 logger = logging.getLogger(__name__)
@@ -30,14 +29,19 @@ copyright = "2026, copsense developers"
 release = version = installed_version("copsense")
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
 ]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+source_suffix = {".ipynb": "myst-nb", ".md": "myst-nb", ".rst": "restructuredtext"}
+# Notebooks have no outputs of their own: each runs at every build.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
 # The scraper below is a function, which the build cache cannot hold.
 suppress_warnings = ["config.cache"]
 exclude_patterns = ["gallery/**/*.ipynb"]
@@ -174,21 +178,23 @@ def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
             logger.warning("docs/theory.md has %d places for its %s, not one", count, name)
 
 
-def write_pages(app: Sphinx, error: Exception | None) -> None:
-    """Make the pages in 3-D that the documentation shows; megabytes that nobody commits."""
+def write_scenes(app: Sphinx, error: Exception | None) -> None:
+    """Make the pages in 3-D by the code that scenes.md shows; megabytes that nobody commits."""
     if error is not None or app.builder.format != "html":
         return
-    import copsense
-
     folder = Path(app.outdir) / "_static"
     folder.mkdir(exist_ok=True)
-    leaning = copsense.analyse(copsense.load_stance("icub"), com_y=0.03)
-    leaning.show().save(folder / "icub-3d.html", overwrite=True)
+    for old in folder.glob("*-3d.html"):
+        old.unlink()
+    page = (HERE / "scenes.md").read_text("utf-8")
+    code = "\n".join(re.findall(r"^```python\n(.*?)^```", page, flags=re.MULTILINE | re.DOTALL))
+    with contextlib.chdir(folder):
+        exec(compile(code, "scenes.md", "exec"), {"__name__": "scenes"})
 
 
 def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings, and make pages in 3-D."""
-    app.connect("build-finished", write_pages)
+    app.connect("build-finished", write_scenes)
     app.connect("source-read", write_tables)
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.connect("autodoc-process-signature", name_aliases)

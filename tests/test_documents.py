@@ -1,6 +1,7 @@
-"""Code shown is code run: the examples, the README's and the documentation's snippets."""
+"""Code shown is code run: here or when the documentation is built."""
 
 import ast
+import json
 import pkgutil
 import re
 import shlex
@@ -14,6 +15,7 @@ from support.fences import blocks, commands
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
 def test_every_class_says_what_it_is():
@@ -33,6 +35,17 @@ def test_an_example_asserts_a_number_and_draws(example):
     assert any(isinstance(node, ast.Assert) for node in code.body)
     drawn = [name.id for node in code.body for name in ast.walk(node) if isinstance(name, ast.Name)]
     assert "figure" in drawn or "show" in example.read_text("utf-8")
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_asserts_a_number_and_holds_no_outputs(notebook):
+    # `make docs` runs each, and fails where a cell does. Jupyter: Edit, Clear Outputs of All Cells.
+    cells = json.loads(notebook.read_text("utf-8"))["cells"]
+    code = [cell for cell in cells if cell["cell_type"] == "code"]
+    assert not any(cell["outputs"] or cell["execution_count"] for cell in code)
+    assert any("assert " in "".join(cell["source"]) for cell in code)
+    index = (notebook.parent / "index.md").read_text("utf-8")
+    assert index.count(notebook.name) == 3, "the notebook stands in the list of index.md"
 
 
 @pytest.mark.parametrize(
