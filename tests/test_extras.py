@@ -90,7 +90,7 @@ def test_every_optional_package_is_in_the_extra_that_its_error_names():
         names = [re.split(r"[\[><=]", need)[0] for need in extras[extra]]
         assert INSTALLED_AS.get(package, package.replace("_", "-")) in names, package
     whole = extras["all"][0]
-    assert {name for name in extras if name not in ("all", "dev", "icub")} == set(
+    assert {name for name in extras if name not in ("all", "gpu", "icub")} == set(
         re.findall(r"\w+", whole)[1:]
     )
 

@@ -14,6 +14,7 @@ EXTRA_OF = {
     "matplotlib": "plots",
     "jinja2": "report",
     "numba": "fast",
+    "numba_cuda": "gpu",
     "mujoco": "sim",
     "msgspec": "sim",
     "imageio_ffmpeg": "video",

@@ -106,8 +106,25 @@ def is_compiled(kernel: Any) -> bool:
         return False
 
 
+def kept(jit: Callable[..., Any], function: Callable[..., Any], **options: Any) -> Any:
+    """Have a function compiled on first use, its machine code kept on disk where there is a place.
+
+    Args:
+        jit: Numba's decorator for the processor or for a device.
+        function: Python.
+        options: of the decorator.
+    """
+    plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
+    try:
+        dispatcher = jit(cache=True, **options)(plain)
+        dispatcher._cache._cache_file._source_stamp = _STAMP
+    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
+        dispatcher = jit(**options)(plain)
+    return dispatcher
+
+
 def _jit(function: _Function, **more: Any) -> _Function:
-    """Compile on first use, keep the machine code on disk, and let other threads run meanwhile."""
+    """Compile for the processor, and let other threads run meanwhile."""
     options: dict[str, Any] = {
         "nogil": True,
         "fastmath": {"contract"},  # a * b + c in one instruction; nothing is reordered
@@ -116,10 +133,4 @@ def _jit(function: _Function, **more: Any) -> _Function:
         "_nrt": False,  # no owners are counted, and nothing is allocated
         **more,
     }
-    plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
-    try:
-        dispatcher = njit(cache=True, **options)(plain)
-        dispatcher._cache._cache_file._source_stamp = _STAMP
-    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
-        dispatcher = njit(**options)(plain)
-    return dispatcher
+    return kept(njit, function, **options)

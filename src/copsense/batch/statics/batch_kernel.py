@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, whole_number
 from copsense.batch.blocks import fill_blocks
+from copsense.batch.devices import is_on_device
 from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.statics.batch_result import (
     BatchResult,
@@ -170,16 +171,21 @@ class BatchKernel:
         *,
         out: BatchResult | None = None,
         threads: int = 1,
+        device: str = "cpu",
     ) -> BatchResult:
         """Evaluate every criterion at every configuration; see `evaluate_batch`."""
         q = self._checked(configurations)
         threads = whole_number(threads, "threads")
+        sent = is_on_device(device)
         if out is not None:
             check_out(out, self._nothing, len(q), gains=self.gains)
         result = self.empty(len(q)) if out is None else out
         doubtful = np.ones((len(q), len(self.names)), dtype=np.uint8)
         if not self.fallback_reason and len(q):
-            self._fill(q, result, doubtful, threads)
+            if sent:
+                self._kernel.on_device(self.empty).fill(q, result, doubtful)
+            if not sent or self.limits is not None:
+                self._fill(q, result, doubtful, threads, within=sent)
         return self._answered(q, result, doubtful)
 
     def limited(
@@ -373,6 +379,7 @@ def evaluate_batch(
     gains: bool = True,
     out: BatchResult | None = None,
     threads: int = 1,
+    device: str = "cpu",
 ) -> BatchResult:
     """Equilibria and sensitivities of many postures.
 
@@ -385,6 +392,9 @@ def evaluate_batch(
         gains: compute CoM gain, CoM travel and tipping edge too.
         out: results of the same shape to overwrite, so that nothing is allocated.
         threads: threads that share the postures; the results do not depend on it.
+        device: ``"cpu"``, or ``"cuda"`` for a graphics processor of NVIDIA's, which evaluates what
+            the compiled kernel covers, without limits; the processor puts the results within them.
+            Results differ in rounding alone.
 
     Returns:
         Results equal to `cop_sensitivity`'s of every row. A row for which it raises is NaN and has
@@ -392,10 +402,11 @@ def evaluate_batch(
 
     Raises:
         InvalidInputError: configurations of the wrong shape, not finite or not normalised;
-            criteria that do not fit; `out` of another shape.
+            criteria that do not fit; `out` of another shape; no device that can be used.
+        MissingExtraError: a device without ``copsense[gpu]``.
     """
     batch = BatchKernel(stance, criteria, limits, gains=gains)
-    return batch.evaluate(configurations, out=out, threads=threads)
+    return batch.evaluate(configurations, out=out, threads=threads, device=device)
 
 
 def _is_given(criterion: object) -> bool:

@@ -23,6 +23,7 @@ class CompiledKernel:
         self._offset = workspace_offsets(layout, nq)
         self._given = (*layout.parts, criteria, np.array(self._offset))
         self._code: Callable[..., bool] | None = None
+        self._device: Any = None
 
     @property
     def compiled(self) -> bool:
@@ -49,16 +50,28 @@ class CompiledKernel:
             doubtful: set above zero where the reference must answer (N, nk).
         """
         from copsense.batch.compiler import bound
-        from copsense.batch.statics.kernel import Out, evaluate_postures
+        from copsense.batch.statics.kernel import evaluate_postures
 
-        arrays: dict[str, Any] = {
-            n: a if n == "com" else flat(a) for n, a in arrays_of(result).items()
-        }
-        arguments = (*self._given, q, Out(**arrays, doubtful=doubtful))
+        arguments = (*self._given, q, out_arrays(result, doubtful))
         if self._code is None:
             given = (*arguments, self.workspace(), 0, 0)
             self._code = bound(evaluate_postures, given, "the statics of many postures")
         return partial(self._code, *arguments)
+
+    def on_device(self, empty: Callable[[int], BatchResult]) -> Any:
+        """The same as a `DeviceKernel`, made when first asked for; `empty` makes results."""
+        from copsense.batch.statics.device_kernel import DeviceKernel
+
+        self._device = self._device or DeviceKernel(self._given[:-1], self._offset, empty)
+        return self._device
+
+
+def out_arrays(result: BatchResult, doubtful: np.ndarray) -> Any:
+    """A result's arrays as `kernel.Out`, the form in which kernels fill them."""
+    from copsense.batch.statics.kernel import Out
+
+    arrays: dict[str, Any] = {n: a if n == "com" else flat(a) for n, a in arrays_of(result).items()}
+    return Out(**arrays, doubtful=doubtful)
 
 
 def flat(array: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.layout import RobotLayout
-from copsense.batch.statics.batch_result import BatchResult, arrays_of
+from copsense.batch.statics.batch_result import BatchResult
 from copsense.batch.statics.criteria import KernelCriteria
 from copsense.batch.statics.kernel_limits import KernelLimits
 from copsense.batch.statics.limit_offsets import limit_offsets
@@ -74,16 +74,12 @@ class CompiledLimits:
             doubtful: above zero where the reference must answer (N, nk).
         """
         from copsense.batch.compiler import bound
-        from copsense.batch.statics.compiled_kernel import flat
-        from copsense.batch.statics.kernel import Out
+        from copsense.batch.statics.compiled_kernel import out_arrays
         from copsense.batch.statics.limit_outputs import LimitOut
         from copsense.batch.statics.limited_kernel import limit_postures
 
         assert isinstance(result.limits, LimitResult)
-        arrays: dict[str, Any] = {
-            n: a if n == "com" else flat(a) for n, a in arrays_of(result).items()
-        }
-        out = Out(**arrays, doubtful=doubtful)
+        out = out_arrays(result, doubtful)
         arguments = (*self._given, q, out, LimitOut(**limit_arrays(result.limits)))
         if self._code is None:
             given = (*arguments, *self.workspace(1), 0, 0)
