@@ -80,6 +80,7 @@ fix: $(DEV_STAMP) ## format, and fix what can be fixed without thought
 docs: $(DEV_STAMP) ## build the documentation into build/docs; a warning is an error
 	$(BIN)/sphinx-build --quiet --fail-on-warning --keep-going --nitpicky \
 	    --doctree-dir build/doctrees --builder html docs build/docs
+	$(BIN)/pytest -n 0 -q tests/built_docs
 	@echo "build/docs/index.html"
 
 .PHONY: package
@@ -103,7 +104,7 @@ venv: $(DEV_STAMP) ## set .venv up for development
 
 .PHONY: clean
 clean: ## remove everything that was built, .venv included
-	rm -rf $(VENV) build dist docs/gallery
+	rm -rf $(VENV) build dist docs/api docs/gallery
 	rm -rf .hypothesis .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find docs examples src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

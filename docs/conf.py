@@ -31,6 +31,7 @@ release = version = installed_version("copsense")
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
 ]
@@ -47,6 +48,8 @@ suppress_warnings = ["config.cache"]
 exclude_patterns = ["gallery/**/*.ipynb"]
 
 default_role = "code"
+autosummary_ignore_module_all = False
+templates_path = ["_templates"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
@@ -112,6 +115,8 @@ html_theme = "furo"
 html_title = "copsense"
 html_static_path = ["_static"]
 html_css_files = ["copsense.css"]
+html_extra_path = ["llms.txt"]
+html_search_scorer = str(HERE / "search_scorer.js")
 html_copy_source = False
 html_show_sphinx = False
 html_math_renderer = "mathml"
@@ -129,12 +134,20 @@ def write_block_math(translator: HTML5Translator, node: nodes.math_block) -> Non
     raise nodes.SkipNode
 
 
+# What TeX reads as one digit and docutils as a whole number: \tfrac12 f would print 12/f.
+AMBIGUOUS = re.compile(r"\\[dt]?(?:frac|binom)(?!\s*\{)|[_^]\s*\d\d|\\sqrt\s*\d\d")
+
+
 def as_mathml(node: nodes.Element, *, as_block: bool) -> str:
-    """The MathML of a formula; one that docutils cannot read is a warning."""
+    """The MathML of a formula; one that docutils cannot read, or reads otherwise, is a warning."""
+    tex = node.astext()
+    unclear = AMBIGUOUS.search(tex)
+    if unclear:
+        logger.warning("braces are missing after %s in: %s", unclear[0], tex, location=node)
     try:
-        return tex2mathml(node.astext(), as_block=as_block)
+        return tex2mathml(tex, as_block=as_block)
     except MathError as error:
-        logger.warning("%s In: %s", error, node.astext(), location=node)
+        logger.warning("%s In: %s", error, tex, location=node)
         return ""
 
 
@@ -162,7 +175,7 @@ def name_aliases(
 
 def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
     """Put what is generated from the package's data in the place of its comment on the page."""
-    if page != "theory":
+    if page != "errata":
         return
     from copsense.paper.claims import VERDICT_STANDARD
     from copsense.paper.report import errata_markdown
@@ -175,7 +188,7 @@ def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
             rf"^% {name}: .*$", lambda _, text=text: text, source[0], flags=re.MULTILINE
         )
         if count != 1:
-            logger.warning("docs/theory.md has %d places for its %s, not one", count, name)
+            logger.warning("docs/errata.md has %d places for its %s, not one", count, name)
 
 
 def write_scenes(app: Sphinx, error: Exception | None) -> None:

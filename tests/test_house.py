@@ -10,7 +10,7 @@ import copsense
 
 ROOT = Path(__file__).parents[1]
 SOURCE = Path(copsense.__file__).parent
-PAGES = [p for p in [*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")] if p.name != "names.md"]
+PAGES = [p for p in [*(ROOT / "docs").rglob("*.md"), *ROOT.glob("*.md")] if p.name != "names.md"]
 
 # What solves programs; polynomials, simplex searches and one-dimensional fits are not meant.
 SOLVERS = {"linprog", "nnls", "lsq_linear", "milp", "daqp"}

@@ -9,7 +9,7 @@ from markdown_it import MarkdownIt
 ROOT = Path(__file__).parents[1]
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
-    for pattern in ("*.md", "docs/*.md", "docs/releases/*.md", "benchmarks/*.md", "paper/*.md")
+    for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "benchmarks/*.md", "paper/*.md")
     for path in ROOT.glob(pattern)
 )
 TARGET = re.compile(r"^\(([\w-]+)\)=$", re.MULTILINE)  # MyST's own anchors

@@ -5,7 +5,7 @@ link of the package page that leads nowhere, an import with a warning, a command
 every command and Python block of the pages.
 
 Run: .venv/bin/python tools/try_wheel.py [--python PYTHON] [--wheel FILE] [PAGE ...]
-     (PAGE: of the repository, README.md if none is given; some ten minutes on two cores)
+     (PAGE: of the repository; the README, the cheat sheet and the tutorials if none is given)
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from support.fences import blocks, commands  # noqa: E402
 from support.public_log import PLACES  # noqa: E402
+from support.sessions import difference, steps  # noqa: E402
 from support.tiny import urdf  # noqa: E402
 
 # What a page shows and this cannot run -> why.
@@ -36,6 +36,7 @@ NOT_HERE = {
     r"^dask |\bHOST\b|\.\.\.": "stands for something else",
     r"^copsense explore (?!.*--export)": "waits for a browser",
 }
+PAGES = ("README.md", "docs/index.md", "docs/cheat_sheet.md", "docs/tutorials/*.md")
 FILE = re.compile(r"(?:^|\s)([\w/-]+\.(?:urdf|mat|toml|nc))(?:\s|$)")
 
 
@@ -50,8 +51,8 @@ def build(python: str) -> Path:
     return next(dist.glob("*.whl"))
 
 
-def run(command: list[str], folder: Path, **variables: str) -> str:
-    """Run a command to its end; what it printed. A failure ends the trial with what it said."""
+def run(command: list[str], folder: Path, expected: int = 0, **variables: str) -> str:
+    """Run a command to its end; what it printed. Another exit code ends the trial with that."""
     # Nothing of the checkout, and no settings of the one who tries.
     ours = {"PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV"}
     environment = {key: value for key, value in os.environ.items() if key not in ours} | variables
@@ -59,7 +60,7 @@ def run(command: list[str], folder: Path, **variables: str) -> str:
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     shown = " ".join(word if len(word) < 70 else word[:60] + " ..." for word in command)
     print(f"{time.monotonic() - start:6.1f} s  {shown.replace(str(ROOT), '.')}", flush=True)
-    if done.returncode:
+    if done.returncode != expected:
         sys.exit(f"ended with {done.returncode}:\n{done.stdout[-3000:]}\n{done.stderr[-3000:]}")
     return done.stdout + done.stderr
 
@@ -117,32 +118,59 @@ def why_not(line: str, folder: Path) -> str:
     for pattern, reason in NOT_HERE.items():
         if re.search(pattern, line):
             return reason
-    given = [name for name in FILE.findall(line) if f"--output {name}" not in line]
+    made = {
+        name for name in FILE.findall(line) if re.search(rf"--(?:output|save-\w+) {name}", line)
+    }
+    given = [name for name in FILE.findall(line) if name not in made]
     missing = [name for name in given if not (folder / name).exists()]
     return f"needs {', '.join(missing)}" if missing else ""
 
 
 def try_page(page: Path, programs: Path, folder: Path) -> None:
-    """Run every command of a page, then its Python blocks as one program."""
+    """Do what a page says: commands with the output that it shows, files, and its Python.
+
+    The Python is one program; it runs again, from the top, before the next command that may need
+    what it writes.
+    """
     folder.mkdir()
     provide(folder)
-    home = {"HOME": str(folder), "PATH": f"{programs}:{os.environ['PATH']}"}
-    for line in commands(page, "sh", "console"):
-        reason = why_not(line, folder)
+    home = {"HOME": str(folder), "PATH": f"{programs}:{os.environ['PATH']}", "MPLBACKEND": "agg"}
+    program, left = "", False
+    for step in steps(page):
+        if step.kind == "python":
+            program, left = program + step.text, True
+            continue
+        if left:
+            run_program(program, programs, folder, home)
+            left = False
+        if step.kind == "file":
+            (folder / step.name).write_text(step.text)
+            continue
+        reason = why_not(step.text, folder)
         if reason:
-            print(f"not run   {line} ({reason})")
-        else:
-            run(["sh", "-c", line], folder, **home)
-    code = "\n".join(blocks(page, "python"))
-    if code:
-        (folder / "page.py").write_text(code)
-        run([str(programs / "python"), "page.py"], folder, MPLBACKEND="agg", **home)
+            print(f"not run   {step.text} ({reason})")
+            continue
+        said = run(["sh", "-c", f"{{ {step.text}; }} 2>&1"], folder, step.code, **home)
+        other = difference(step.shown, said) if step.shown else ""
+        if other:
+            sys.exit(f"{page.name}: {step.text}\n{other}")
+    if left:
+        run_program(program, programs, folder, home)
+
+
+def run_program(program: str, programs: Path, folder: Path, home: dict[str, str]) -> None:
+    """Run a page's Python as one program in its folder."""
+    (folder / "page.py").write_text(program)
+    run([str(programs / "python"), "page.py"], folder, **home)
 
 
 def main() -> None:
     """Read the arguments and try everything."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("pages", nargs="*", default=["README.md"], metavar="PAGE")
+    pages = [
+        path.relative_to(ROOT).as_posix() for name in PAGES for path in sorted(ROOT.glob(name))
+    ]
+    parser.add_argument("pages", nargs="*", default=pages, metavar="PAGE")
     parser.add_argument("--python", default=sys.executable, help="the interpreter to try it with")
     parser.add_argument("--wheel", type=Path, help="a wheel that is there already")
     options = parser.parse_args()

@@ -67,7 +67,7 @@ def posture_weights(stance: Stance, cost: PostureCost) -> Float[np.ndarray, " nv
 def cost_derivatives(
     stance: Stance, home: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient of 1/2 w |deviation|^2 in the base's frame, and that gradient's derivative."""
+    """Gradient of ``1/2 w |deviation|^2`` in the base's frame, and that gradient's derivative."""
     model = stance.robot.model
     deviation = pin.difference(model, home, stance.q)
     hessian = np.diag(weights)

@@ -35,9 +35,13 @@ class Answer:
         return lines[0]
 
 
-def copsense(*arguments):
-    """Run ``copsense ARGUMENTS``; an exception that escapes fails the test."""
-    out, err = io.StringIO(), io.StringIO()
+def copsense(*arguments, together=False):
+    """Run ``copsense ARGUMENTS``; an exception that escapes fails the test.
+
+    With ``together`` errors and notes are in the output, where a terminal shows them.
+    """
+    out = io.StringIO()
+    err = out if together else io.StringIO()
     with (
         patch.object(sys, "argv", ["copsense", *map(str, arguments)]),
         redirect_stdout(out),

@@ -28,7 +28,7 @@ def test_the_formulas_of_the_table_can_be_set():
 
 
 def test_the_page_has_one_place_for_what_is_generated():
-    page = (ROOT / "docs" / "theory.md").read_text("utf-8")
+    page = (ROOT / "docs" / "errata.md").read_text("utf-8")
     for name in ("errata table", "standard of verdicts"):
         assert len(re.findall(rf"^% {name}: ", page, flags=re.MULTILINE)) == 1
     assert r"\tfrac1" not in page  # docutils reads only braces
