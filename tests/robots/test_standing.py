@@ -2,6 +2,7 @@
 
 import itertools
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +13,12 @@ from support.walkers import BIPED, FOUR, FULL, bent, walker
 import copsense
 from copsense import Contact, Plane
 from copsense.errors import InvalidInputError
-from copsense.robots import ImplausibleStanceWarning, UprightWarning, plausibility_notes
+from copsense.robots import (
+    ImplausibleStanceWarning,
+    UprightWarning,
+    heading_notes,
+    plausibility_notes,
+)
 
 WRENCH = copsense.minimum_wrench(1.0)
 LEG = FULL[1:4]  # roll, hip, knee: a quadruped's, on point feet
@@ -187,3 +193,17 @@ def test_masses_that_are_not_kilograms_are_doubted(mass, said):
 @pytest.mark.parametrize("name", ["icub", "talos", "human", "go2", "four_bar", "iCubLisboa01"])
 def test_nothing_is_doubted_about_a_preset(name, stance_of):
     assert plausibility_notes(stance_of(name)) == ()
+    assert heading_notes(stance_of(name)) == ()
+
+
+@pytest.mark.parametrize(
+    ("yaw", "said"), [(90.0, "90 deg to the left"), (-60.0, "60 deg to the right")]
+)
+def test_soles_whose_axes_do_not_point_ahead_are_named(icub, yaw, said):
+    turn = pin.rpy.rpyToMatrix(0.0, 0.0, np.radians(yaw))
+    contacts = [replace(c, rotation=c.rotation @ turn, plane=None) for c in icub.contacts]
+    stance = icub.with_contacts(contacts)
+    (note,) = heading_notes(stance)
+    assert f"l_sole and r_sole points {said}" in note
+    assert note in copsense.analyse(stance).notes
+    assert heading_notes(icub) == ()

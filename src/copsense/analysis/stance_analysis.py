@@ -23,7 +23,7 @@ from copsense.joint_notes import joint_limit_notes
 from copsense.json_data import json_data
 from copsense.limits import Limits, limit_rows, optional_limits, torque_placeholders
 from copsense.path import LateralPath
-from copsense.robots import plausibility_notes, sole_notes
+from copsense.robots import heading_notes, plausibility_notes, sole_notes
 from copsense.sensitivity import CopSensitivity, check_sensitivity, cop_sensitivity
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import (
@@ -325,6 +325,7 @@ def analyse(
         *_limit_notes(here, within, limited),
         *freedom_notes(here),
         *plausibility_notes(here),
+        *heading_notes(here),
         *sole_notes(here),
         *joint_limit_notes(here),
         *(f"{name}: {note}" for name, spread in spreads.items() for note in spread.notes),

@@ -3,7 +3,7 @@
 from copsense.robots.contact_soles import ContactGeometryWarning, sole_notes, soles_read
 from copsense.robots.four_bar import four_bar_angles, four_bar_robot
 from copsense.robots.inspection import Inspection, inspect_robot
-from copsense.robots.plausibility import ImplausibleStanceWarning, plausibility_notes
+from copsense.robots.plausibility import ImplausibleStanceWarning, heading_notes, plausibility_notes
 from copsense.robots.presets import PRESETS, Preset
 from copsense.robots.stance_file import StanceFile, save_stance, stance_data
 from copsense.robots.standing import (
@@ -26,6 +26,7 @@ __all__ = [
     "UprightWarning",
     "four_bar_angles",
     "four_bar_robot",
+    "heading_notes",
     "inspect_robot",
     "likely_feet",
     "load_robot",

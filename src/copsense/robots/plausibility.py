@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from copsense.contact import Contact
 from copsense.errors import InvalidInputError
-from copsense.listing import first_few
+from copsense.listing import first_few, listed
 from copsense.magnitudes import in_metres, in_radians
 from copsense.polygon import Polygon
 from copsense.reach import robot_reach
@@ -25,6 +25,7 @@ _FAR_BEYOND = np.radians(10.0)  # rad beyond a joint's limit
 _FAR_SLID = 0.05  # m
 _THIN = 1 / 200  # of the robot's reach: a narrower sole is hardly all of it
 _FLIPPED = 0.5  # cosine under which a contact was not where its base was turned to: 60 degrees
+_AHEAD = 45.0 + 1e-6  # deg between a contact's x axis and world x, beyond which names mislead
 _UP = 0.1  # z of a contact's normal from which it stands on something
 _LEVEL = 5e-3  # m, and 1 - cosine: soles within it are on one plane
 _OVERLAP = 0.1  # of the smaller sole, from which two lie in each other
@@ -86,6 +87,28 @@ def plausibility_notes(stance: Stance) -> tuple[str, ...]:
         *_drive_notes(stance),
         *_joint_notes(stance),
         *_hanging_notes(stance),
+    )
+
+
+def heading_notes(stance: Stance) -> tuple[str, ...]:
+    """Which feet face elsewhere than ahead (world x), so that their own front and left are others.
+
+    Results name the sides of a sole by the contact's axes: x the front, y the left.
+    """
+    turned: dict[int, list[str]] = {}
+    for contact, place in zip(stance.contacts, stance.placements, strict=True):
+        x, _, z = place.rotation.T
+        if contact.kind == "point" or z[2] <= _UP:
+            continue  # its axes are its plane's, or it does not stand on it
+        angle = float(np.degrees(np.arctan2(x[1], x[0])))
+        if abs(angle) > _AHEAD:
+            turned.setdefault(round(angle), []).append(contact.name)
+    return tuple(
+        f"the x axis of {listed(names)} points {abs(angle)} deg to the "
+        f"{'left' if angle > 0 else 'right'} of world x: front, back, left and right of a sole are "
+        "by its own axes. Turn the contact's axes (--contact-rpy, Contact(rotation=)), or the "
+        "robot (--base-yaw, base_rpy), for x to point ahead."
+        for angle, names in turned.items()
     )
 
 
