@@ -37,7 +37,8 @@ extensions = [
 ]
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-source_suffix = {".ipynb": "myst-nb", ".md": "myst-nb", ".rst": "restructuredtext"}
+# autosummary writes pages with the first suffix whose parser may be that of reStructuredText.
+source_suffix = {".rst": "restructuredtext", ".ipynb": "myst-nb", ".md": "myst-nb"}
 # Notebooks have no outputs of their own: each runs at every build.
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
