@@ -12,6 +12,8 @@ BIN := $(VENV)/bin
 RUN_STAMP := $(VENV)/.installed-run
 DEV_STAMP := $(VENV)/.installed-dev
 REPRODUCTION := build/reproduction
+# What the tests of copsense.torch run with. With CUDA, as pip has it on Linux, gigabytes.
+TORCH ?= torch==2.13.0
 # What the tests of a module share is made in one process; conftest.py puts long modules first.
 PYTEST_ARGS ?= -n auto --maxprocesses 8 --dist loadscope --no-loadscope-reorder
 
@@ -101,6 +103,11 @@ history: $(DEV_STAMP) ## what a posture costs here and at the commit BASE, as ra
 
 .PHONY: venv
 venv: $(DEV_STAMP) ## set .venv up for development
+
+.PHONY: torch
+torch: $(DEV_STAMP) ## PyTorch into .venv, which the tests of copsense.torch need
+	@$(BIN)/python -c 'import torch' 2>/dev/null || $(BIN)/python -m pip install --quiet --quiet \
+	    --disable-pip-version-check --group learning '$(TORCH)'
 
 .PHONY: clean
 clean: ## remove everything that was built, .venv included

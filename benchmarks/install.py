@@ -21,7 +21,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = Path(__file__).with_suffix(".md")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-EXTRAS = [name for name in PROJECT["optional-dependencies"] if name != "all"] + ["all"]
+# PyTorch's size depends on where pip takes it from.
+LEFT_OUT = ("all", "torch")
+EXTRAS = [name for name in PROJECT["optional-dependencies"] if name not in LEFT_OUT] + ["all"]
 
 # What everything needs, and why it is no extra.
 REASONS = {

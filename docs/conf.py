@@ -54,6 +54,7 @@ templates_path = ["_templates"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_type_aliases = {"ArrayLike": "ArrayLike"}
+autodoc_mock_imports = ["torch"]  # the page is the same where it is not installed
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
@@ -62,8 +63,9 @@ python_use_unqualified_type_names = True
 
 # Types that are documented elsewhere: without the network there is nothing to link them to.
 ELSEWHERE = (
-    *("coal", "collections", "dataclasses", "fractions", "jaxtyping", "matplotlib", "np", "numpy"),
-    *("pandas", "pathlib", "pd", "pin", "pinocchio", "scipy", "typing", "xarray", "xr"),
+    *("coal", "collections", "dataclasses", "fractions", "jax", "jaxtyping", "matplotlib", "np"),
+    *("numpy", "pandas", "pathlib", "pd", "pin", "pinocchio", "scipy", "torch", "typing", "xarray"),
+    "xr",
 )
 nitpick_ignore_regex = [
     (r"py:.*", rf"({'|'.join(ELSEWHERE)})\..*"),

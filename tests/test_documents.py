@@ -56,6 +56,7 @@ def test_a_notebook_asserts_a_number_and_holds_no_outputs(notebook):
         "docs/balancing.md",
         "docs/explore.md",
         "docs/hardware.md",
+        "docs/learning.md",
         "docs/logs.md",
         "docs/maps.md",
         "docs/optimise.md",

@@ -28,6 +28,8 @@ EXTRA_OF = {
     "trimesh": "explore",
     "collada": "explore",
     "fast_simplification": "explore",
+    "torch": "torch",
+    "jax": "jax",
 }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import partial
+from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +21,7 @@ from copsense.batch.layout import robot_layout, why_not_covered
 from copsense.batch.postures.chart_values import checked_ends, checked_values
 from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
+    Coordinates,
     Unit,
     chart_coordinates,
     joint_units,
@@ -79,6 +81,7 @@ class PostureChart:
         fallback_reason: why postures are solved one at a time; empty where the kernel does it.
     """
 
+    nearest: ClassVar[bool] = False  # whether values are whole postures to come near to
     stance: Stance
     names: tuple[str, ...]
     units: tuple[Unit, ...]
@@ -115,7 +118,7 @@ class PostureChart:
         if not len(coordinates):
             raise InvalidInputError("a chart needs one coordinate at least, got none. Name one.")
         self.stance = stance
-        self._coordinates = chart_coordinates(stance, coordinates)
+        self._coordinates = self._meaning_on(stance, coordinates)
         self.names, self.units = self._coordinates.names, self._coordinates.units
         self.values = self._coordinates.given[self._coordinates.place]
         self.values.flags.writeable = False
@@ -140,6 +143,15 @@ class PostureChart:
         self._over = None if over is None else checked_ends(over, self.names)
         known = self._over is not None and not self.fallback_reason
         self._nearby = None if known else nothing_nearby(self._coordinates)
+
+    @property
+    def meaning(self) -> Coordinates:
+        """What the coordinates set and free."""
+        return self._coordinates
+
+    @staticmethod
+    def _meaning_on(stance: Stance, names: Sequence[str]) -> Coordinates:
+        return chart_coordinates(stance, names)
 
     @property
     def compiled(self) -> bool:

@@ -107,7 +107,7 @@ def _advance(
             # Motions that the contacts hold to second order are asked for as what they are: else
             # Newton only halves the error in them, and ends where J is all but deficient.
             rows, errors = np.array(fold[0]), fold[1]
-            rows[:, : here.robot.base_nv] = rows[:, : here.robot.base_nv] @ _base_rates(here, given)
+            rows[:, : here.robot.base_nv] = rows[:, : here.robot.base_nv] @ base_rates(here, given)
             J = np.vstack([J, rows[:, list(limb.unknowns)]])
             step = -np.linalg.lstsq(J, np.concatenate([e, errors]), rcond=RANK_TOLERANCE)[0]
         else:
@@ -206,7 +206,7 @@ def constraint_errors(
 def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) -> np.ndarray:
     """dh/dx of a limb."""
     nb, blocks = here.robot.base_nv, []
-    B = _base_rates(here, given)
+    B = base_rates(here, given)
     for k in limb.contacts:
         contact, place = here.contacts[k], here.placements[k]
         rows = here.jacobian[here.rows[k]]
@@ -220,7 +220,7 @@ def _jacobian(here: Stance, plan: Coordinates, given: np.ndarray, limb: Limb) ->
     return J[:, list(limb.unknowns)]
 
 
-def _base_rates(here: Stance, given: np.ndarray) -> np.ndarray:
+def base_rates(here: Stance, given: np.ndarray) -> np.ndarray:
     """Velocity of the base in its own frame per rate of its coordinates."""
     B = np.eye(here.robot.base_nv)
     if here.robot.base_nv == 6:
