@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from copsense.content import ShortRepr
+from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.path import COM_COORDINATES
 from copsense.stance import Stance
@@ -77,6 +77,10 @@ class Coordinates(ShortRepr):
     slopes: np.ndarray
     low: np.ndarray
     high: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Own the arrays."""
+        freeze(self, "given", "place", "positions", "rotations", "slopes", "low", "high")
 
 
 def solved_whole(stance: Stance) -> bool:

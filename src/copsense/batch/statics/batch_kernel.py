@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 from typing import TypeGuard
 
 import numpy as np
@@ -39,6 +38,7 @@ from copsense.batch.statics.limit_result import (
     limit_template,
 )
 from copsense.batch.statics.reference import fill_row, sides, sole_edges
+from copsense.content import FrozenMapping
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
@@ -125,7 +125,7 @@ class BatchKernel:
         lines = [c.name for c in stance.contacts if c.sole is not None and len(c.sole) == 2]
         if not self.fallback_reason and lines:
             self.fallback_reason = f"the sole of {lines[0]} is a line"
-        self.by_reference, self._served = MappingProxyType({}), np.zeros(0, dtype=np.int64)
+        self.by_reference, self._served = FrozenMapping({}), np.zeros(0, dtype=np.int64)
         if not self.fallback_reason:
             layout = robot_layout(stance, sole_edges(stance))
             served, self.by_reference = kernel_criteria(stance, layout.feet, self.criteria)

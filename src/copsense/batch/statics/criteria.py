@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from copsense.batch.layout import Feet
+from copsense.content import FrozenMapping
 from copsense.criterion import Criterion, Quadratic
 from copsense.stance import Stance
 from copsense.statics import WrenchPolicy, policy_name
@@ -82,7 +82,7 @@ def kernel_criteria(
     )
     for i, (_, quadratic) in enumerate(served):
         _enter(found, i, stance, feet, quadratic)
-    return found, MappingProxyType(left)
+    return found, FrozenMapping(left)
 
 
 def _why_left(stance: Stance, feet: Feet, quadratic: Quadratic) -> str:
