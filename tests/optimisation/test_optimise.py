@@ -271,6 +271,9 @@ def test_what_no_posture_keeps_is_named(icub):
         assert named in str(error.value)
     with pytest.raises(UnreachablePostureError, match="distance of l_sole and r_sole at least"):
         optimise(icub, objective="torque", over={"com_z": 0.01}, distance=(0.2, 0.3), starts=1)
+    # What is broken by a share of each is broken by no length.
+    with pytest.raises(UnreachablePostureError, match="are broken least these contradict"):
+        optimise(icub, over={"com_z": None}, require={"gain": 0.1}, starts=1)
 
 
 def test_bad_questions_are_rejected(icub, stance_of):
@@ -285,6 +288,7 @@ def test_bad_questions_are_rejected(icub, stance_of):
         ({"reserve": {"wheel": 0.1}}, UnknownNameError, "wheel"),
         ({"reserve": {"knee": -0.1}}, InvalidInputError, "negative"),
         ({"require": {"travel": 0.1}}, InvalidInputError, "optimised, and required"),
+        ({"require": {"gain": -1.0}}, InvalidInputError, "less than zero of it"),
         ({"family": "joints", "criterion": TORQUE}, InvalidInputError, "Give one of them"),
         ({"starts": 0}, InvalidInputError, "starts"),
         ({"limits": NO_LIMITS}, InvalidInputError, "limit nothing"),

@@ -61,7 +61,8 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
     help="A coordinate that may vary, and its range: as --at names them (degrees, metres, or with "
     "units), or com, turn (of the base), joints (off the limbs in contact) or feet; =+-WIDTH to "
     "either side of where it is. Repeatable; default com and turn. Limbs in contact follow. none, "
-    "with --family: the criterion's weights alone, as in copsense design.",
+    "with --family: the criterion's weights alone; with --objective sideways they are those of "
+    "copsense design.",
 )
 @click.option(
     "--within",

@@ -118,4 +118,9 @@ def required_of(require: Mapping[str, float] | None, *objectives: Quantity) -> d
                 f"{name} is what is optimised, and required as well. Leave one of them out."
             )
         found[name] = finite_number(value, f"the required {name}")
+        if found[name] < 0 and quantity.sign < 0:
+            raise InvalidInputError(
+                f"the required {name} is {quantity.shown(found[name])} at most, and nothing has "
+                "less than zero of it. Give a positive number."
+            )
     return found

@@ -8,7 +8,7 @@ import numpy as np
 
 from copsense.errors import UnreachablePostureError
 from copsense.listing import first_few
-from copsense.optimisation.objectives import Quantity
+from copsense.optimisation.objectives import QUANTITIES, Quantity
 from copsense.optimisation.posture_program import PostureProgram
 from copsense.optimisation.question import Progress
 from copsense.optimisation.solver import Solution, least_violation, solve
@@ -51,9 +51,11 @@ def _unreachable(
             "--starts, or begin nearer (--at)."
         )
     named = dict.fromkeys(_short(name) for name in names)
+    placed = any("in place" in n for n in named)
+    length = placed and not any(n.partition(" ")[0] in QUANTITIES for n in named)
     return UnreachablePostureError(
         f"no posture of {robot!r} keeps all constraints. Where they are broken least"
-        + (f", by {violation * 100:.3g} mm," if any("in place" in n for n in named) else "")
+        + (f", by {violation * 100:.3g} mm," if length else "")
         + (
             f" these contradict each other: {first_few(named, 8)}. Relax one of them."
             if len(named) > 1
