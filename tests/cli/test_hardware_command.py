@@ -54,3 +54,12 @@ def test_a_range_is_swept_and_says_where_the_robot_cannot_stand(tmp_path):
 )
 def test_bad_input_is_one_line(arguments, message):
     assert message in copsense("hardware", "four_bar", *arguments).error
+
+
+def test_a_wrench_cone_says_that_soles_are_left_out():
+    sole = ("--sole=-0.06:0.13:-0.045:0.045", "--limits", "friction=0.4,torsion=cone")
+    asked = ("hardware", "icub", *sole, "--no-check", "--rows", "1")
+    assert "left out under an exact wrench cone: sole_length, sole_width" in copsense(*asked).out
+    found = copsense(*asked, "--json").json
+    assert "sole_inner" in found["left_out"]
+    assert "sole_inner" not in found["parameters"]

@@ -13,7 +13,10 @@ from copsense.hardware import (
     hardware_sweep,
     parameter_named,
 )
+from copsense.hardware.effects import nominal_ends
 from copsense.hardware.pairs import all_alike, mirrored
+from copsense.path import LateralPath
+from copsense.scan import PathScan
 
 TORQUE = copsense.minimum_torque()
 
@@ -168,5 +171,44 @@ def test_what_moves_nothing_and_what_has_no_travel_are_errors(icub, stance_of):
         hardware_effects(aside, TORQUE)
     with pytest.raises(InvalidInputError, match="hardware is of a robot at rest"):
         hardware_effects(icub.moving(np.zeros(29), np.zeros(29)), TORQUE)
+    cone = copsense.Limits(friction=0.4, torsion="cone")
+    sole = [parameter_named("sole_inner", icub)]
+    with pytest.raises(InvalidInputError, match="leaves out what changes a sole: sole_inner"):
+        hardware_effects(icub, TORQUE, cone, sole)
     with pytest.raises(InvalidInputError, match="a step of 150%"):
         hardware_effects(icub, TORQUE, step=1.5)
+
+
+def test_no_limit_before_the_limbs_end_is_said_as_such(icub):
+    unlimited = copsense.Limits(normal_force=None, friction=None, cop_margin=None)
+    far = PathScan(LateralPath(icub, reach=0.5), TORQUE)
+    with pytest.raises(InvalidInputError, match=r"before the limbs of 'icub' end: .* goes \d+ mm"):
+        nominal_ends(far, unlimited)
+
+
+def test_what_is_of_another_robot_is_one_error(icub, icub_effects, stance_of):
+    bar = stance_of("four_bar")
+    hips = parameter_named("hip_width", icub)
+    for question in (
+        lambda: hardware_effects(bar, TORQUE, parameters=[hips]),
+        lambda: hardware_sweep(bar, TORQUE, hips, [0.05]),
+        lambda: changed(bar, TORQUE, {hips: 0.05}),
+    ):
+        with pytest.raises(InvalidInputError, match="hip_width is of 'l_hip_pitch', which robot"):
+            question()
+    with pytest.raises(InvalidInputError, match="of another stance or criterion"):
+        hardware_sweep(bar, TORQUE, "hip_width", [0.2], nominal=icub_effects)
+    with pytest.raises(InvalidInputError, match="an amount of each parameter"):
+        icub_effects.gains(np.zeros(2))
+
+
+def test_forces_between_heel_and_toe_are_chosen_as_elsewhere(stance_of):
+    cassie = stance_of("cassie")
+    hips = [parameter_named("hip_width", cassie)]
+    found = hardware_effects(cassie, TORQUE, parameters=hips, step=1e-3, checked=1)
+    assert "leaves forces undetermined" in found.notes[0]
+    less, more = (point.smallest for point in found.checks["hip_width"])
+    by = 2e-3 * hips[0].size
+    assert (more - less) / by == pytest.approx(found.slopes[0, 2, 0], rel=1e-3)
+    swept = hardware_sweep(cassie, TORQUE, hips[0], [0.28], nominal=found)
+    assert swept.best.smallest < found.smallest

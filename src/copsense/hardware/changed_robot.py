@@ -17,6 +17,7 @@ from copsense.criterion import Criterion
 from copsense.drives import Drives, Spring
 from copsense.errors import InvalidInputError
 from copsense.hardware.parameter import Alteration, Parameter
+from copsense.hardware.parameter_list import check_parameters
 from copsense.posture import solve_posture
 from copsense.robot import Robot
 from copsense.stance import Stance
@@ -37,9 +38,10 @@ def changed(
         values: parameter -> what it is instead.
 
     Raises:
-        InvalidInputError: a value that the parameter cannot have.
+        InvalidInputError: a value that the parameter cannot have, or one of another robot.
         UnreachablePostureError: no posture of such a robot has its contacts there.
     """
+    check_parameters(stance, tuple(values))
     steps = [(p.alteration, p.checked(value) - p.nominal) for p, value in values.items()]
     model = stance.robot.model.copy()
     for change, d in steps:

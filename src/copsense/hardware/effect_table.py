@@ -92,7 +92,7 @@ def _group(effects: HardwareEffects, group: str, order: tuple[int, ...]) -> Iter
     checked = any(name in effects.checks for name in names)
     amount = effects.amount_of(group)[1]
     columns = ["as it is", f"{amount} more", "less", "better"]
-    step = f"{effects.step:.0%}"
+    step = f"{effects.step * 100:g}%"
     columns += [f"step ({step})", "step less", "step more"] if checked else []
     more = effects.gains(effects.units)[:, 2] * 1e3
     less = effects.gains(-effects.units)[:, 2] * 1e3
@@ -147,6 +147,11 @@ def _summary(effects: HardwareEffects) -> Iterator[str]:
                 yield f"{name} at {shown_value(p, point.value)}: {point.reason}"
     if effects.idle:
         yield f"moves nothing here: {first_few(effects.idle, 8)}"
+    if effects.left_out:
+        yield (
+            f"left out under an exact wrench cone: {first_few(effects.left_out, 8)}; --change "
+            "sweeps them"
+        )
 
 
 def _gain(millimetres: float, decimals: int = 3) -> str:

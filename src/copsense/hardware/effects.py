@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from copsense.arrays import check_type, checked_tuple, finite_number, whole_number
+from copsense.arrays import check_type, finite_array, finite_number, whole_number
 from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.hardware.altered_travel import ChangedTravel, changed_travel
 from copsense.hardware.parameter import Parameter
-from copsense.hardware.parameter_list import hardware_parameters
+from copsense.hardware.parameter_list import check_parameters, hardware_parameters
 from copsense.hardware.stance_rates import HardwareRates
 from copsense.hardware.travel_end import SIDES, TIED, EndRates, TravelEnd, end_rates, travel_end
 from copsense.limits import Limits, optional_limits
@@ -24,6 +24,8 @@ from copsense.listing import first_few, listed
 from copsense.path import LateralPath
 from copsense.scan import PathScan
 from copsense.stance import Stance, check_stance
+from copsense.statics import tie_break_note, with_tie_break
+from copsense.statics.tie_breaks import TIE_BREAK
 from copsense.uncertainty import check_uncertain
 
 if TYPE_CHECKING:
@@ -48,6 +50,7 @@ class HardwareEffects:
         limits: what ends a travel.
         parameters: those that move something (p in all).
         idle: names of those that move nothing here.
+        left_out: names of the soles that were not changed: under an exact wrench cone.
         ends: of the travel to +y and to -y, as the robot is.
         rates: how they follow the parameters, exact.
         step: share of each parameter's size by which it is changed for the check.
@@ -59,6 +62,7 @@ class HardwareEffects:
     limits: Limits
     parameters: tuple[Parameter, ...]
     idle: tuple[str, ...]
+    left_out: tuple[str, ...]
     ends: tuple[TravelEnd, ...]
     rates: tuple[EndRates, ...]
     step: float
@@ -112,6 +116,7 @@ class HardwareEffects:
         Args:
             amounts: of each parameter, in its unit; negative for less of it.
         """
+        amounts = finite_array(amounts, "an amount of each parameter", (len(self.parameters),))
         sides = [
             end.travel + rates.gained(amounts)
             for end, rates in zip(self.ends, self.rates, strict=True)
@@ -159,8 +164,9 @@ class HardwareEffects:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Where a limit is met together with another, so that what gains to one costs to it."""
-        found = []
+        """What the criterion left open, and limits met together: what gains to one costs to it."""
+        tied = self.criterion.tie_break is TIE_BREAK
+        found = [tie_break_note(self.criterion.name)] if tied else []
         costly = [
             p.name for p, way in zip(self.parameters, self.better, strict=True) if way == "neither"
         ]
@@ -214,6 +220,7 @@ class HardwareEffects:
             "smallest": self.smallest,
             "parameters": rows,
             "idle": list(self.idle),
+            "left_out": list(self.left_out),
             "notes": list(self.notes),
         }
 
@@ -268,7 +275,7 @@ def hardware_effects(
 
     Args:
         stance: the robot as it is.
-        criterion: what shares the load.
+        criterion: what shares the load; it is given a tie-break where it needs one.
         limits: what ends a travel; default ``Limits()``: contacts that do not pull or slip,
             centres of pressure in their soles.
         parameters: what may change; default all of `hardware_parameters`.
@@ -279,13 +286,14 @@ def hardware_effects(
 
     Raises:
         InvalidInputError: a stance in motion or with parts that hang, no limit within reach to
-            either side, one that is passed already, or a wrench cone with soles that change.
+            either side, one that is passed already, or a wrench cone and nothing but soles.
         CopsenseError: the criterion has no solution here.
     """
     check_stance(stance)
     check_uncertain(stance, "hardware")
     remedy = "Give one, such as copsense.minimum_torque()."
     check_type(criterion, Criterion, "a criterion", remedy)
+    criterion = with_tie_break(stance, criterion)
     share = finite_number(step, "the step of a check", positive=True)
     if share >= 1:
         raise InvalidInputError(
@@ -294,9 +302,10 @@ def hardware_effects(
         )
     count = whole_number(checked, "how many parameters are checked", least=0)
     within = optional_limits(limits) or Limits()
-    given = _given(stance, criterion, parameters)
-    if within.torsion == "cone":  # its faces follow the sole in a way of their own
-        given = tuple(p for p in given if not p.alteration.soles)
+    if parameters is None:
+        parameters = hardware_parameters(stance, criterion)
+    given = check_parameters(stance, parameters)
+    given, left_out = _without_soles(given) if within.torsion == "cone" else (given, ())
     scan = PathScan(LateralPath(stance), criterion)
     ends = nominal_ends(scan, within)
     all_rates = HardwareRates(stance, given)
@@ -316,6 +325,7 @@ def hardware_effects(
         within,
         tuple(given[i] for i in keep),
         tuple(p.name for i, p in enumerate(given) if i not in keep),
+        left_out,
         ends,
         tuple(EndRates(r.limits, r.gaps, r.rates[:, keep]) for r in found),
         share,
@@ -339,6 +349,12 @@ def nominal_ends(scan: PathScan, limits: Limits) -> tuple[TravelEnd, ...]:
             )
     if not any(end.limit for end in ends):
         reach = max(end.reach for end in ends)
+        if reach < float(scan.path.values[-1]) - scan.start - 1e-6:
+            raise InvalidInputError(
+                f"no limit is met before the limbs of {scan.begin.stance.robot.name!r} end: with "
+                f"its contacts in place its CoM goes {reach * 1e3:.0f} mm to either side. Bend its "
+                "legs (--com-z), or stand it elsewhere (--width)."
+            )
         raise InvalidInputError(
             f"no limit is met within {reach * 1e3:.0f} mm to either side, so that nothing buys "
             "travel. Give limits that are (--limits friction=0.4,torque=model), or soles "
@@ -347,16 +363,20 @@ def nominal_ends(scan: PathScan, limits: Limits) -> tuple[TravelEnd, ...]:
     return ends
 
 
-def _given(
-    stance: Stance, criterion: Criterion, parameters: Sequence[Parameter] | None
-) -> tuple[Parameter, ...]:
-    if parameters is None:
-        return hardware_parameters(stance, criterion)
-    remedy = "Give some of copsense.hardware.hardware_parameters(stance)."
-    found = checked_tuple(parameters, Parameter, "parameter", remedy)
-    if not found:
-        raise InvalidInputError(f"no parameter is given. {remedy}")
-    return found
+def _without_soles(given: tuple[Parameter, ...]) -> tuple[tuple[Parameter, ...], tuple[str, ...]]:
+    """What changes no sole, and the names of the rest: a cone's faces turn with its sole.
+
+    Raises:
+        InvalidInputError: nothing is left.
+    """
+    kept = tuple(p for p in given if not p.alteration.soles)
+    left_out = tuple(p.name for p in given if p.alteration.soles)
+    if not kept:
+        raise InvalidInputError(
+            f"the exact wrench cone leaves out what changes a sole: {first_few(left_out, 8)}. Give "
+            "another torsion limit, or sweep one (hardware_sweep, --change)."
+        )
+    return kept, left_out
 
 
 def _with_checks(

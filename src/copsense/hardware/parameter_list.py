@@ -11,6 +11,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense import rigid_body
+from copsense.arrays import checked_tuple
 from copsense.contact import Contact
 from copsense.criterion import Criterion
 from copsense.criterion_text import STIFFNESS
@@ -94,6 +95,29 @@ def parameter_named(name: str, stance: Stance, criterion: Criterion | None = Non
     raise InvalidInputError(
         f"robot {robot!r} has no {kind}: {why}. Valid: {', '.join(valid[:20])}."
     )
+
+
+def check_parameters(stance: Stance, given: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """Parameters of this robot.
+
+    Raises:
+        InvalidInputError: none is given, something else than a parameter, or one of a contact, link
+            or joint that the robot does not have.
+    """
+    remedy = "Give some of copsense.hardware.hardware_parameters(stance)."
+    found = checked_tuple(given, Parameter, "parameter", remedy)
+    if not found:
+        raise InvalidInputError(f"no parameter is given. {remedy}")
+    robot = stance.robot
+    own = {*stance.contact_names, *link_names(robot), *robot.model.names, *robot.torque_names}
+    for parameter in found:
+        lacking = [name for name in parameter.where if name not in own]
+        if lacking:
+            raise InvalidInputError(
+                f"{parameter.name} is of {lacking[0]!r}, which robot {robot.name!r} does not have "
+                f"here. {remedy}"
+            )
+    return found
 
 
 def _alone(stance: Stance, criterion: Criterion | None) -> tuple[Parameter, ...]:

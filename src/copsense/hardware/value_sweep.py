@@ -17,9 +17,10 @@ from copsense.errors import InvalidInputError
 from copsense.hardware.altered_travel import ChangedTravel, changed_travel
 from copsense.hardware.effects import HardwareEffects, hardware_effects, travel_row
 from copsense.hardware.parameter import Parameter
-from copsense.hardware.parameter_list import parameter_named
+from copsense.hardware.parameter_list import check_parameters, parameter_named
 from copsense.limits import Limits
 from copsense.stance import Stance
+from copsense.statics import with_tie_break
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -162,7 +163,13 @@ def hardware_sweep(
         raise InvalidInputError(f"there is no value of {parameter.name} to try. Give one.")
     for value in given.tolist():
         parameter.checked(value)
+    check_parameters(stance, [parameter])
     nominal = nominal or hardware_effects(stance, criterion, limits)
+    criterion = with_tie_break(stance, criterion)
+    remedy = "Give hardware_effects(stance, criterion) of the same two, or leave it out."
+    check_type(nominal, HardwareEffects, "the nominal robot's effects", remedy)
+    if nominal.stance is not stance or nominal.criterion != criterion:
+        raise InvalidInputError(f"the nominal effects are of another stance or criterion. {remedy}")
     points = []
     for value in given.tolist():
         points.append(changed_travel(stance, criterion, nominal.limits, {parameter: value}))
