@@ -12,6 +12,7 @@ from copsense.cli import copsense as group
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.drives import Transmission
 from copsense.loads import SpringLoad
+from copsense.robots import StanceFile
 
 FEET = ("--contact", "l_foot", "--contact", "r_foot", "--contact-at", "sole")
 BENT = tuple(
@@ -132,6 +133,25 @@ def test_a_stance_that_was_moved_has_the_same_analysis_when_it_is_read(
             library.load_stance("icub"), joints={"l_elbow": np.radians(30)}, **moved
         )
         assert once.json["com"] == analysis.to_dict()["com"]
+
+
+def test_a_stance_file_keeps_the_criteria_that_were_named_and_no_default(tmp_path):
+    def kept(*words):
+        file = tmp_path / f"{len(list(tmp_path.iterdir()))}.toml"
+        assert copsense("analyse", *words, "--save-stance", file).code == 0
+        return file, [c.name for c in StanceFile.read(file).criteria]
+
+    plain_file, names = kept("solo12")
+    assert names == []  # so that a command that takes one criterion has its own default
+    assert copsense("hardware", "--stance", plain_file, "--rows", "1").code == 0
+    named, names = kept("solo12", "--criterion", "minimum-wrench")
+    assert names == ["minimum-wrench"]
+    assert kept("--stance", named)[1] == names
+    two = ("--criterion", "minimum-wrench", "--criterion", "minimum-torque")
+    both, names = kept("solo12", *two)
+    assert names == ["minimum-wrench", "minimum-torque"]
+    error = copsense("hardware", "--stance", both).error
+    assert "2 criteria (minimum-wrench, minimum-torque), and this command takes one" in error
 
 
 def test_loads_springs_and_friction_are_what_they_say(plain):

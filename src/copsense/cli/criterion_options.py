@@ -61,18 +61,25 @@ def read_criterion(names: tuple[str, ...], characteristic_length: float) -> Crit
     found = read_criteria(names, characteristic_length)
     if len(found) > 1:
         raise InvalidInputError(
-            f"the stance file has {len(found)} criteria, and a robot balances under one. Name it: "
-            f"--criterion {found[0].name}, or leave the others out of the file."
+            f"the stance file has {len(found)} criteria ({', '.join(c.name for c in found)}), and "
+            f"this command takes one. Name it: --criterion {found[0].name}, or leave the others "
+            "out of the file."
         )
     return found[0]
 
 
 def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
     """The criteria named, or the paper's two."""
+    return given_criteria(names, characteristic_length) or given_criteria(
+        ("minimum-wrench", "minimum-torque"), characteristic_length
+    )
+
+
+def given_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
+    """The criteria named, or those of the stance file, or none: each command has its default."""
     from copsense.criterion_text import criterion_from_text
 
     file = remembered_stance()
-    if not names and file is not None and file.criteria:
+    if not names and file is not None:
         return list(file.criteria)
-    chosen = dict.fromkeys(names or ("minimum-wrench", "minimum-torque"))
-    return [criterion_from_text(name, characteristic_length) for name in chosen]
+    return [criterion_from_text(name, characteristic_length) for name in dict.fromkeys(names)]

@@ -52,13 +52,13 @@ def written(
         criteria: instead of those that the command's options name.
     """
     if path is not None:
-        from copsense.cli.criterion_options import read_criteria
+        from copsense.cli.criterion_options import given_criteria
         from copsense.cli.limit_options import read_limits
         from copsense.robots import save_stance
 
         given: dict[str, Any] = click.get_current_context().params
         if criteria is None and "criteria" in given:
-            criteria = read_criteria(given["criteria"], given["characteristic_length"])
+            criteria = given_criteria(given["criteria"], given["characteristic_length"])
         save_stance(
             stance,
             path,
