@@ -6,6 +6,7 @@ import pytest
 import copsense
 from copsense import Contact, minimum_torque, minimum_wrench
 from copsense.errors import UndeterminedWrenchError
+from copsense.regions import com_regions, criterion_region
 from copsense.statics import with_tie_break
 
 
@@ -30,6 +31,14 @@ def test_internal_forces_are_decided_by_a_tie_break_that_is_said(heel_and_toe):
     assert note.startswith("minimum-torque")
     expected = copsense.solve_equilibrium(heel_and_toe, tied)
     np.testing.assert_array_equal(found.equilibria["minimum-torque"].forces, expected.forces)
+
+
+def test_its_region_within_limits_is_that_of_the_tied_criterion(heel_and_toe):
+    torque, limits = minimum_torque(), copsense.Limits(friction=0.5)
+    found = com_regions(heel_and_toe, [torque, minimum_wrench(1.0)], limits)
+    tied = with_tie_break(heel_and_toe, torque)
+    expected = criterion_region(heel_and_toe, tied, limits)
+    np.testing.assert_array_equal(found.unclipped["minimum-torque"].polygon, expected.polygon)
 
 
 def test_a_criterion_that_determines_is_left_as_it_is(icub, heel_and_toe):

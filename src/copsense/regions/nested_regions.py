@@ -17,7 +17,7 @@ from copsense.regions.feasible_region import com_region
 from copsense.regions.region import ComRegion
 from copsense.regions.unclipped_region import criterion_region
 from copsense.stance import Stance, check_stance
-from copsense.statics import named_criteria
+from copsense.statics import named_criteria, with_tie_breaks
 
 SUPPORTED, ACTUATED = "friction and soles", "and torque limits"
 
@@ -107,19 +107,21 @@ def com_regions(
 
     Args:
         stance: the posture.
-        criteria: whose own wrenches are asked about, each of another name.
+        criteria: whose own wrenches are asked about, each of another name. One that leaves forces
+            undetermined that contacts exert against each other gets a tie-break.
         limits: what the wrenches and torques must respect.
         tolerance: of `com_region` [m].
 
     Raises:
         InfeasibleError: no equilibrium within the limits, wherever the CoM is.
-        UndeterminedWrenchError: a criterion leaves several wrenches equally good.
+        UndeterminedWrenchError: a criterion even so leaves several wrenches equally good.
         InvalidInputError: limits or weights that do not fit the stance.
         UnknownNameError: a torque limit names no joint.
     """
     check_stance(stance)
     check_limits(limits)
-    chosen = named_criteria(criteria, "a comparison of regions", policies=False)
+    named = named_criteria(criteria, "a comparison of regions", policies=False)
+    chosen, _ = with_tie_breaks([stance], named)  # as an analysis of the posture does
     actuated = None
     if limits.torque is not None:
         actuated = com_region(stance, limits, tolerance=tolerance)
