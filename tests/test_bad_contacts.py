@@ -103,7 +103,7 @@ def test_a_contact_at_a_frame_off_the_sole_warns_in_millimetres():
 
 
 def test_a_robot_that_is_no_preset_asks_for_its_contacts():
-    with pytest.raises(InvalidInputError, match=r"--contact FRAME.*all: .*left"):
+    with pytest.raises(InvalidInputError, match=r"--contact FRAME.*all: .*left.*copsense inspect"):
         copsense.load_stance(urdf())
 
 

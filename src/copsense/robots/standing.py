@@ -191,7 +191,8 @@ def load_stance(
             raise InvalidInputError(
                 f"robot {robot.name!r} is not a preset, so its contacts are not known. Name their "
                 f"frames, contacts=[...] (--contact FRAME); {'likely ones' if likely else 'all'}: "
-                f"{', '.join(likely or robot.frame_names)}."
+                f"{', '.join(likely or robot.frame_names)}. `copsense inspect FILE` finds its "
+                "soles, and prints the line that stands it on them."
             )
         chosen: tuple[Contact, ...] = preset.contacts
     elif isinstance(contacts, str):
