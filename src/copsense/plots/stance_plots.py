@@ -34,6 +34,7 @@ from copsense.uncertainty import Spread
 
 _STEP = 20.0  # mm that the CoM moves for the arrows
 _FLATTEST = 0.6  # height of what is drawn from above, by its width
+_NARROW, _NARROWEST = 0.5, 0.9  # of points, width by length; and of what is drawn of them
 _UNSEEN = 0.1  # mm: smaller is nothing to see
 _WORST: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 2))}
 _FORWARD, _LEFT = "#009E73", "#CC79A7"
@@ -211,6 +212,10 @@ def _write_loads(
 ) -> None:
     """Name, load and travel left of each contact, in front of it (behind it for a hind foot)."""
     front = np.median(origins[:, 0])
+    points = all(sole is None for sole in soles)
+    reach, spread = np.ptp(origins[:, :2], axis=0)
+    aside = points and spread < _NARROW * reach  # words go out to both sides, lest they meet
+    axis = (origins[:, 1].min() + origins[:, 1].max()) / 2
     for k, contact in enumerate(stance.contacts):
         share = result.equilibrium.wrenches[k, 2] / stance.robot.weight
         lines = [contact.name, f"{share:.0%} of the weight"]
@@ -228,7 +233,7 @@ def _write_loads(
             (middle, edge),
             xytext=(0, 9 if ahead else -9),
             textcoords="offset points",
-            ha="center",
+            ha=_side(middle - axis) if aside else "center",
             va="bottom" if ahead else "top",
             fontsize=8.5,
             color=INK,
@@ -238,13 +243,22 @@ def _write_loads(
     low, high = ax.get_ylim()
     behind = any(origin[0] < front - 1.0 for origin in origins)
     ax.set_ylim(low - 0.22 * behind * (high - low), high + 0.22 * (high - low))
-    if all(sole is None for sole in soles):
+    if points:
         left, right = ax.get_xlim()
         ax.set_xlim(left + 0.3 * (left - right), right - 0.3 * (left - right))
     low, high = ax.get_ylim()
     left, right = ax.get_xlim()
+    if aside:
+        narrow = max(_NARROWEST * (high - low) - (left - right), 0.0)
+        ax.set_xlim(left + narrow / 2, right - narrow / 2)
+    left, right = ax.get_xlim()
     thin = max(_FLATTEST * (left - right) - (high - low), 0.0)  # feet in a line: no room for words
     ax.set_ylim(low - thin / 2, high + thin / 2)
+
+
+def _side(left: float) -> str:
+    """Words of a left foot end at it, of a right foot start there: the two do not meet."""
+    return "center" if abs(left) < 1.0 else "right" if left > 0 else "left"
 
 
 def _length(travel: float) -> str:
