@@ -76,6 +76,7 @@ nitpick_ignore_regex = [
     (r"py:class", r"copsense\.paper\.claims\.verdict\.(Subject|Other)"),
     (r"py:class", r"copsense\.content\.(Key|Value)|copsense\.labelled\.R|_Problem"),
     (r"py:class", r"copsense\.statics\.tie_breaks\.C"),
+    (r"py:class", r"copsense\.batch\.postures\.coordinates\.Coordinates"),  # no page of its own
 ]
 
 
