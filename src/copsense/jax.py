@@ -181,11 +181,9 @@ def _evaluate(cops: CopMap, travel: bool, x: jax.Array) -> tuple[jax.Array, ...]
     def compute(given: Any) -> tuple[np.ndarray, ...]:
         rows = np.asarray(given, dtype=np.float64)
         found = cops.evaluate(rows.reshape(-1, k), everything=travel)
-        travels = found.travel if travel else np.zeros((len(found), 0))
-        arrays = (found.cop, found.margin, travels, found.valid, found.gradient, found.inward)
         return tuple(
             array.reshape(*rows.shape[:-1], *end).astype(kind)
-            for array, end, kind in zip(arrays, ends, kinds, strict=True)
+            for array, end, kind in zip(found.arrays(travel), ends, kinds, strict=True)
         )
 
     if not isinstance(x, jax.core.Tracer):  # errors as they are, and no detour

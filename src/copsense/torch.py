@@ -171,9 +171,7 @@ class _Cop(torch.autograd.Function):  # type: ignore[misc]
             kind = tensor.dtype if tensor.dtype == torch.bool else x.dtype
             return tensor.to(kind).reshape((*batch, *array.shape[1:]))
 
-        travels = found.travel if travel else np.zeros((len(found), 0))
-        arrays = (found.cop, found.margin, travels, found.valid, found.gradient, found.inward)
-        return tuple(as_given(array) for array in arrays)
+        return tuple(as_given(array) for array in found.arrays(travel))
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Any, ...], output: tuple[torch.Tensor, ...]) -> None:

@@ -49,6 +49,15 @@ class Evaluation:
         """How many postures, and how many of them are valid."""
         return f"Evaluation({int(self.valid.sum())} postures of {len(self)} valid)"
 
+    def arrays(self, everything: bool) -> tuple[np.ndarray, ...]:
+        """cop, margin, travel, valid, gradient and inward, each with a row for every posture.
+
+        Args:
+            everything: whether it was asked for; travels have no columns otherwise.
+        """
+        travel = self.travel if everything else np.zeros((len(self), 0))
+        return self.cop, self.margin, travel, self.valid, self.gradient, self.inward
+
     def rows(self, first: int, stop: int) -> Evaluation:
         """Some rows, in the same memory."""
         part = slice(first, stop)
