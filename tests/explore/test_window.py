@@ -58,6 +58,17 @@ def test_a_slider_moves_the_robot_and_the_command_says_what_the_table_does(explo
         assert explorer._worker.error == ""
 
 
+def test_before_its_first_work_the_window_has_the_view_that_it_shows(icub, monkeypatch):
+    monkeypatch.setattr("copsense.explore.worker.Worker.start", lambda _: None)
+    with Explorer(Model(icub), meshes=False, light=True) as explorer:
+        with Client(explorer) as client:
+            client.until("copsense analyse icub<")
+        explorer._from_above()
+        explorer._from_front()
+        assert explorer.view.revision == 0
+        np.testing.assert_allclose(explorer.view.q, icub.q)
+
+
 def test_what_the_command_asked_for_stays_to_the_last_digit(stance_of):
     state = State(
         ("four_bar",),

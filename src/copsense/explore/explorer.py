@@ -74,20 +74,18 @@ class Explorer:
         self._lock = threading.Lock()
         state = state or replace(model.start, overlays=frozenset({"curve"}))
         self._shape, problem = _shape_of(model, meshes)
-        first = model.view(state)
+        self._first = model.view(state)
         self.server = GuardedServer(port, host)
         try:
-            self._begin(state, first, problem, light, dark)
+            self._begin(state, problem, light, dark)
         except BaseException:
             self.server.stop()
             raise
         self.seconds = time.monotonic() - begun
 
-    def _begin(
-        self, state: State, first: View, problem: list[str], light: bool, dark: bool
-    ) -> None:
+    def _begin(self, state: State, problem: list[str], light: bool, dark: bool) -> None:
         """Fill the window, and start the thread."""
-        viser, model = self.server.viser, self.model
+        viser, model, first = self.server.viser, self.model, self._first
         viser.gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", dark_mode=dark
         )
@@ -118,7 +116,7 @@ class Explorer:
         self._compiling: threading.Thread | None = None
         self._weighing = threading.Lock()
         place_camera(viser, first)
-        viser.on_client_connect(lambda client: fit_camera(client, self.view or first))
+        viser.on_client_connect(lambda client: fit_camera(client, self.view))
         self._publish(first)
         self._limited = threadpool_limits(1)  # small matrices: more threads only cost
         self._worker.start()
@@ -133,9 +131,9 @@ class Explorer:
         return self.server.url
 
     @property
-    def view(self) -> View | None:
+    def view(self) -> View:
         """What is shown now."""
-        return self._worker.view
+        return self._worker.view or self._first
 
     def close(self) -> None:
         """Stop working, then listening."""
@@ -254,8 +252,6 @@ class Explorer:
         from copsense.robots import PRESETS, save_stance
 
         view = self.view
-        if view is None:
-            return
         state = view.state
         name = "".join(c if c.isalnum() or c in "-_" else "-" for c in self.model.stance.robot.name)
         number, path = 1, Path(f"{name}-stance.toml")
@@ -281,15 +277,13 @@ class Explorer:
 
     def _from_above(self) -> None:
         self._panel.hide_robot(True)  # what counts is under it
-        if self.view is not None:
-            middle, size = support(self.view)
-            self._move_cameras(middle, middle + size * np.array([-1e-3, 0.0, 1.0]))
+        middle, size = support(self.view)
+        self._move_cameras(middle, middle + size * np.array([-1e-3, 0.0, 1.0]))
 
     def _from_front(self) -> None:
         self._panel.hide_robot(False)
-        if self.view is not None:
-            middle, size = look_at(self.view)
-            self._move_cameras(middle, middle + size * np.array([1.25, 0.0, 0.1]))
+        middle, size = look_at(self.view)
+        self._move_cameras(middle, middle + size * np.array([1.25, 0.0, 0.1]))
 
     def _move_cameras(self, at: np.ndarray, where: np.ndarray) -> None:
         for client in self.server.viser.get_clients().values():
