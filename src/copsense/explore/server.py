@@ -14,6 +14,7 @@ import ipaddress
 import os
 import secrets
 import socket
+import warnings
 from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from typing import Any
@@ -78,6 +79,8 @@ class GuardedServer:
             if override is not None:
                 os.environ[_PORT_OVERRIDE] = override
         self._close_tunnel()
+        # A tab may close while its camera is moved: nothing is lost, and nobody can help it.
+        warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         if self.viser.get_port() != self.port:  # taken between the probe and now
             self.stop()
             raise OutputError(f"port {self.port} was taken meanwhile. Give another --port.")
