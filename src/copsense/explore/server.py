@@ -79,7 +79,7 @@ class GuardedServer:
             if override is not None:
                 os.environ[_PORT_OVERRIDE] = override
         self._close_tunnel()
-        # A tab may close while its camera is moved: nothing is lost, and nobody can help it.
+        # A tab may close while its camera is moved: nothing is lost.
         warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
         if self.viser.get_port() != self.port:  # taken between the probe and now
             self.stop()
