@@ -207,13 +207,19 @@ def _weights(
 
 def _solve(X: np.ndarray, rest: np.ndarray, effective: float) -> tuple[np.ndarray, np.ndarray]:
     """Least squares over the directions that are seen, and which of them are (p,)."""
-    flat = X.reshape(-1, X.shape[2])
-    _, s, vt = np.linalg.svd(flat, full_matrices=True)
-    s = np.pad(s, (0, len(vt) - len(s)))
+    s, vt = _directions(X)
     seen = s > _student(effective, len(vt)) / _UNKNOWN
     V = vt[seen].T
+    flat = X.reshape(-1, X.shape[2])
     step = V @ ((V.T @ (flat.T @ rest.reshape(-1))) / s[seen] ** 2)
     return step, seen
+
+
+def _directions(X: Float[np.ndarray, "N c p"]) -> tuple[np.ndarray, np.ndarray]:
+    """Singular values (p,) of the sensitivities, and the directions (p, p), a row each."""
+    # Of the triangle alone: the left vectors of thousands of rows take seconds.
+    _, s, vt = np.linalg.svd(np.linalg.qr(X.reshape(-1, X.shape[2]), mode="r"))
+    return np.pad(s, (0, len(vt) - len(s))), vt
 
 
 def _student(effective: float, parameters: int) -> float:
@@ -234,9 +240,7 @@ def _result(
     rest = measurements.values - values
     weights, effective = _weights(rest, measurements.values.std(axis=0))
     X = _centred(slopes) * weights[:, None]
-    flat = X.reshape(-1, X.shape[2])
-    _, s, vt = np.linalg.svd(flat, full_matrices=True)
-    s = np.pad(s[: len(vt)], (0, max(0, len(vt) - len(s))))
+    s, vt = _directions(X)
     reach = _student(effective, len(u))
     seen = s > reach / _UNKNOWN
     covariance = (vt[seen].T / s[seen] ** 2) @ vt[seen]
