@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from copsense.blas import one_blas_thread
 from copsense.content import ShortRepr, freeze
 from copsense.criterion import (
     Criterion,
@@ -161,6 +162,7 @@ class Design(ShortRepr):
         return dict(json_data(data))
 
 
+@one_blas_thread()
 def design_criterion(
     path: PosturePath,
     limits: Limits,

@@ -22,6 +22,7 @@ from copsense.arrays import (
     read_only,
     whole_number,
 )
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.errors import (
     CopsenseError,
@@ -174,6 +175,7 @@ def check_path(path: object, *, search: bool = False) -> None:
     check_type(path, kinds, "a path of postures", remedy)
 
 
+@one_blas_thread()
 def lateral_sweep(
     stance: Stance,
     start: float,
@@ -363,6 +365,7 @@ class LateralPath:
         return found
 
 
+@one_blas_thread()
 def joint_sweep(
     stance: Stance,
     joint: str,
@@ -402,6 +405,7 @@ def joint_sweep(
     return _sweep(stance, joint, robot.joint_unit(joint), values, now, solver, progress)
 
 
+@one_blas_thread()
 def path_through(
     stance: Stance,
     configurations: Iterable[ArrayLike],

@@ -23,6 +23,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import finite_array, read_only
+from copsense.blas import one_blas_thread
 from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
@@ -192,6 +193,7 @@ def _degrees(angle: float) -> int:
     return 180 - (180 - round(math.degrees(angle))) % 360
 
 
+@one_blas_thread()
 def push_limits(
     stance: Stance,
     frame: str | None = None,
@@ -253,6 +255,7 @@ def _any_pushes(
     return PushRegion(ANY, polygon, ("",) * len(polygon))
 
 
+@one_blas_thread()
 def push_planes(
     stance: Stance,
     criterion: Criterion,

@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from copsense.arrays import array_property, finite_array, finite_number, read_only
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion, check_criterion
@@ -364,6 +365,7 @@ def finite_difference_sensitivity(
     return _sensitivity(equilibrium, Z, np.stack(wrenches, -1), np.stack(torques, -1))
 
 
+@one_blas_thread()
 def check_sensitivity(
     stance: Stance,
     criterion: Criterion,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from copsense.arrays import check_type
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.errors import (
     CopsenseError,
@@ -325,6 +326,7 @@ class Sweep(LabelledResult):
         return found
 
 
+@one_blas_thread()
 def sweep(
     path: PosturePath,
     criteria: Sequence[Criterion | WrenchPolicy],

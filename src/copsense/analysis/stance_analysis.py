@@ -14,6 +14,7 @@ from copsense.analysis.asked import asked_posture, determined_criteria
 from copsense.analysis.limit_analysis import LimitAnalysis, analyse_limits
 from copsense.analysis.verdicts import verdict
 from copsense.arrays import finite_number
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.cop import support_polygon, total_center_of_pressure
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
@@ -241,6 +242,7 @@ class Analysis:
         return rows
 
 
+@one_blas_thread()
 def analyse(
     stance: Stance,
     criteria: Sequence[Criterion | WrenchPolicy] | None = None,

@@ -12,8 +12,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
+from copsense.blas import one_blas_thread
 from copsense.comparison.case import Case
 from copsense.comparison.score import Score, failed
 from copsense.robot import Robot
@@ -30,7 +29,7 @@ def run_here(
 ) -> Iterator[tuple[Case, list[Score]]]:
     """Run cases in this process, in turn."""
     robots: dict[str, Robot] = {}
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_blas_thread():
         for case in cases:
             with shared_presets(robots):
                 scores = run(case, lambda seconds, case=case: progress(case, seconds))  # type: ignore[misc]
@@ -131,7 +130,7 @@ def _work(link: Any, run: Run) -> None:
             link.send(UserWarning(str(message)))  # a category that cannot be sent
 
     warnings.showwarning = send_warning
-    with threadpool_limits(limits=1, user_api="blas"), shared_presets():
+    with one_blas_thread(), shared_presets():
         try:
             while True:
                 link.send(run(link.recv(), link.send))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
+from copsense.blas import one_blas_thread
 from copsense.design import Objective
 from copsense.errors import CopsenseError
 from copsense.explore.best_weights import best_weights
@@ -71,7 +72,7 @@ class Explorer:
         """
         begun = time.monotonic()
         self.model, self._status, self._saved, self._problem = model, "", "", ""
-        self._lock = threading.Lock()
+        self._lock, self._resources = threading.Lock(), ExitStack()
         state = state or replace(model.start, overlays=frozenset({"curve"}))
         self._shape, problem = _shape_of(model, meshes)
         self._first = model.view(state)
@@ -79,6 +80,7 @@ class Explorer:
         try:
             self._begin(state, problem, light, dark)
         except BaseException:
+            self._resources.close()
             self.server.stop()
             raise
         self.seconds = time.monotonic() - begun
@@ -118,7 +120,7 @@ class Explorer:
         place_camera(viser, first)
         viser.on_client_connect(lambda client: fit_camera(client, self.view))
         self._publish(first)
-        self._limited = threadpool_limits(1)  # small matrices: more threads only cost
+        self._resources.enter_context(one_blas_thread())
         self._worker.start()
         self._worker.submit(state)
         self._closing = threading.Event()
@@ -140,7 +142,7 @@ class Explorer:
         self._closing.set()
         self._worker.stop()
         self.server.stop()
-        self._limited.unregister()
+        self._resources.close()
 
     def __enter__(self) -> Explorer:
         """Itself."""

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import check_type, finite_array, finite_number, whole_number
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
@@ -257,6 +258,7 @@ class HardwareEffects:
 _COLUMNS = (*SIDES, "smallest")
 
 
+@one_blas_thread()
 def hardware_effects(
     stance: Stance,
     criterion: Criterion,

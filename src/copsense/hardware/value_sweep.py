@@ -12,6 +12,7 @@ from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from copsense.arrays import check_type, finite_array
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.hardware.altered_travel import ChangedTravel, changed_travel
@@ -126,6 +127,7 @@ class HardwareSweep:
         return whole_figure(plot_hardware_sweep(self))
 
 
+@one_blas_thread()
 def hardware_sweep(
     stance: Stance,
     criterion: Criterion,

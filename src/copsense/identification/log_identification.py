@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Int
 
 from copsense.arrays import check_type, finite_number, whole_number
+from copsense.blas import one_blas_thread
 from copsense.contact import Contact
 from copsense.design import Family, joint_groups
 from copsense.errors import InvalidInputError
@@ -29,6 +30,7 @@ from copsense.stance import Stance
 ROWS = 500  # that are evaluated at most
 
 
+@one_blas_thread()
 def identify_log(
     log: Log,
     robot: str | Path | Robot | Stance,
@@ -69,6 +71,7 @@ def identify_log(
     )
 
 
+@one_blas_thread()
 def hip_ankle_ratio(
     log: Log,
     robot: str | Path | Robot | Stance,

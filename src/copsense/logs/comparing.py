@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import check_type, finite_number, whole_number
+from copsense.blas import one_blas_thread
 from copsense.contact import Contact
 from copsense.cop import resultant, wrench_cops
 from copsense.criterion import Criterion, minimum_torque, minimum_wrench
@@ -30,6 +31,7 @@ from copsense.statics import named_criteria
 SKIPPED = 3.0  # s at the beginning that are left out of the slopes
 
 
+@one_blas_thread()
 def compare_log(
     log: Log,
     robot: str | Path | Robot | Stance,

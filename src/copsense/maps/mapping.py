@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from copsense.arrays import whole_number
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.limits import Limits
 from copsense.maps.chunks import ChunkEvaluator
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int], object]
 
 
+@one_blas_thread()
 def map_postures(
     stance: Stance,
     sampling: Sampling,

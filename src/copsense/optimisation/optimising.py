@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import whole_number
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.design import Family
 from copsense.errors import CopsenseError, InvalidInputError
@@ -36,6 +37,7 @@ _CROSSED = 1e-6  # of the constraints, by which a place may break them
 _STILL = 1e-7  # of the variables: slopes under which a coordinate moves nothing
 
 
+@one_blas_thread()
 def optimise(
     stance: Stance,
     criterion: Criterion | None = None,

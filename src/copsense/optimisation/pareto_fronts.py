@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import whole_number
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.design import Family
 from copsense.errors import InvalidInputError
@@ -23,6 +24,7 @@ from copsense.optimisation.variables import Range
 from copsense.stance import Stance
 
 
+@one_blas_thread()
 def pareto_front(
     stance: Stance,
     objectives: tuple[str, str],

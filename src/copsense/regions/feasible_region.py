@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.arrays import finite_number
+from copsense.blas import one_blas_thread
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, check_limits, limit_rows
 from copsense.load_problem import LoadProblem
@@ -19,6 +20,7 @@ from copsense.stance import Stance, check_stance
 FINEST = 1e-7  # m: tolerances below this ask more than the linear programs resolve
 
 
+@one_blas_thread()
 def com_region(stance: Stance, limits: Limits, *, tolerance: float = 1e-4) -> ComRegion:
     """Where the CoM may be so that some static equilibrium within the limits exists.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.criterion import Criterion
 from copsense.json_data import json_data
@@ -100,6 +101,7 @@ class ComRegions(Mapping[str, ComRegion]):
         return {SUPPORTED: self.supported, **actuated, **self.unclipped}
 
 
+@one_blas_thread()
 def com_regions(
     stance: Stance, criteria: Sequence[Criterion], limits: Limits, *, tolerance: float = 1e-4
 ) -> ComRegions:

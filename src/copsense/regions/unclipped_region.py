@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from copsense.blas import one_blas_thread
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, check_limits, limit_rows
@@ -24,6 +25,7 @@ _NOTHING = 1e-9  # of the weight: what rounding leaves of a slope that is zero
 Affine = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]  # f0, F, tau0, T
 
 
+@one_blas_thread()
 def criterion_region(
     stance: Stance, criterion: Criterion | WrenchPolicy, limits: Limits, *, moving: bool = False
 ) -> ComRegion:

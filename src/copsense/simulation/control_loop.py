@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from copsense.arrays import check_type, finite_number, is_finite
+from copsense.blas import one_blas_thread
 from copsense.controllers.controller import Controller, Observation, ask, controller_name
 from copsense.controllers.target import PathReference, Target, lateral_reference
 from copsense.criterion import Criterion
@@ -82,7 +82,7 @@ def rollout(
     if until not in ("tip", "fall"):
         raise UnknownNameError("end of a rollout", until, ("tip", "fall"))
     # The matrices of a step are small: with more BLAS threads it is many times slower.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with one_blas_thread():
         return _run(
             simulator,
             controller,

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.arrays import array_property, check_type, whole_number
+from copsense.blas import one_blas_thread
 from copsense.content import freeze
 from copsense.cop import contact_cops
 from copsense.criterion import Criterion, check_criterion
@@ -292,6 +293,7 @@ class Spread:
         return {g: x / total for g, x in sorted(groups.items(), key=lambda item: -item[1])}
 
 
+@one_blas_thread()
 def propagate_uncertainty(
     stance: Stance,
     criterion: Criterion | WrenchPolicy,
@@ -374,6 +376,7 @@ def propagate_uncertainty(
     )
 
 
+@one_blas_thread()
 def sample_models(
     stance: Stance,
     criterion: Criterion,
