@@ -13,7 +13,8 @@ def one_blas_thread() -> Iterator[None]:
     """Around what evaluates many postures or steps, also as a decorator.
 
     A posture's matrices have some tens of rows: more threads only cost, many times the wall time
-    where another process wants the processors too, and change the order of sums. Of several threads the first to ask decides for all, until it leaves.
+    where another process wants the processors too, and change the order of sums. Of several threads
+    the first to ask decides for all, until it leaves.
     """
     with threadpool_limits(limits=1, user_api="blas"):
         yield
