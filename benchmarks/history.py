@@ -62,7 +62,7 @@ def asv(*arguments: str, path: Path | None = None, read: bool = False) -> str:
     environment = os.environ | {"HOME": str(BUILD)}
     environment |= {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
     if path is not None:
-        environment["PYTHONPATH"] = str(path)
+        environment["ASV_PYTHONPATH"] = str(path)  # asv takes PYTHONPATH off
     command = [sys.executable, "-m", "asv", *arguments, "--config", str(CONFIG)]
     done = subprocess.run(
         command, env=environment, cwd=ROOT, text=True, stdout=subprocess.PIPE if read else None
