@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.commands import copsense as command
 from support.standing import C1, C2, icub
-from support.walkers import BIPED, PITCH_ONLY, bent, walker
+from support.walkers import BIPED, FULL, NO_ANKLE_ROLL, PITCH_ONLY, bent, walker
 
 import copsense
 from copsense.controllers import Ramp, Sine
@@ -71,3 +71,38 @@ def test_straight_legs_are_the_cause_and_bent_ones_stand(tmp_path):
     stood = command(*words)
     assert stood.code == 0, stood.out
     assert "likely cause" not in stood.out
+
+
+def five_joints(joints, knee, aside):
+    return copsense.load_stance(
+        walker(joints, trunk=(0.0, aside, 0.2)),
+        contacts=BIPED,
+        contact_at="sole",
+        posture=bent(knee),
+    )
+
+
+def test_feet_that_all_but_repeat_each_other_are_the_cause_and_minimum_wrench_stands():
+    """Without hip yaw minimum torque saves 0.02 Nm by a yaw moment of 12 kNm between the feet."""
+    stance = five_joints(FULL[1:], 0.8, 0.01)
+    fell = copsense.balance(stance, C2, Scenario(0.3))
+    assert fell.end.kind == "fall"
+    cause = fell.attrs["likely_cause"]
+    assert cause.startswith("contacts that all but repeat each other: the limbs of l_foot and")
+    assert "none about z (yaw)" in cause
+    assert "--criterion minimum-wrench" in cause
+    assert not any("limits=Limits()" in note for note in fell.notes)
+    assert copsense.balance(stance, C1, Scenario(0.3)).tip is None
+
+
+@pytest.mark.filterwarnings("ignore::copsense.robots.StandingWarning")
+@pytest.mark.parametrize(
+    ("joints", "knee", "aside"),
+    [(FULL[1:], 0.8, 0.0), (FULL[1:], 0.1, 0.0), (NO_ANKLE_ROLL, 0.1, 0.01)],
+    ids=["load jumps aside", "no posture aside", "forces felt within rounding"],
+)
+def test_legs_of_five_joints_hold_still_where_they_cannot_sway(joints, knee, aside):
+    run = copsense.balance(five_joints(joints, knee, aside), C2, Scenario(0.1))
+    assert run.completed
+    assert run.tip is None
+    assert any("leaves forces undetermined" in note for note in run.notes)

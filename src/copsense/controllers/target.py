@@ -280,13 +280,8 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
     check_stance(stance)
     _check_signal(signal)
     low, high = signal.extent
-    if low == high == 0 and 1 in held_com_axes(stance):
-        # To hold still needs a path, whichever: along what the contacts leave to the CoM.
-        free = [axis for axis in (0, 2) if axis not in held_com_axes(stance)]
-        if free:
-            name, at = COM_COORDINATES[free[0]], float(stance.com[free[0]])
-            around = com_sweep(stance, name, at - _SPACING, at + _SPACING, 3)
-            return PathReference(around.shifted(-at), signal)
+    if low == high == 0:
+        return PathReference(_path_to_hold(stance), signal)
     start, ground = float(stance.com[1]), min(p.translation[2] for p in stance.placements)
     if max(abs(low), abs(high)) > stance.com[2] - ground:
         raise UnreachablePostureError(
@@ -306,6 +301,25 @@ def lateral_reference(stance: Stance, signal: Signal) -> PathReference:
                 raise UnreachablePostureError(few.failures[i])
     path = lateral_sweep(stance, start + low, start + high, count, com_x=float(stance.com[0]))
     return PathReference(path.shifted(-start), signal)
+
+
+def _path_to_hold(stance: Stance) -> PosturePath:
+    """To hold still needs a path, whichever: sideways, or along what else the contacts leave.
+
+    Legs of too few joints may stand where they cannot sway.
+    """
+    held = held_com_axes(stance)
+    names = [COM_COORDINATES[i] for i in (1, 0, 2) if i not in held] or ["com_y"]
+    own = dict(zip(COM_COORDINATES, stance.com.tolist(), strict=True))
+    paths = []
+    for name in names:
+        at, still = own[name], {n: own[n] for n in names if n not in (name, "com_z")}
+        path = com_sweep(stance, name, at - _SPACING, at + _SPACING, 3, held=still).shifted(-at)
+        # Where rank is gained, contacts share the load at once otherwise.
+        if not path.failures and all(there.rank == stance.rank for there in path.stances):
+            return path
+        paths.append(path)
+    return paths[0]
 
 
 def _check_signal(signal: object) -> None:

@@ -14,6 +14,7 @@ from copsense.contact import Contact
 from copsense.cop import wrench_cops
 from copsense.criterion import Criterion, minimum_wrench
 from copsense.errors import CopsenseError, InfeasibleError
+from copsense.freedom import repetition_notes
 from copsense.limits import Limits
 from copsense.statics import StaticEquilibrium, solve_equilibrium
 
@@ -51,6 +52,8 @@ def at_rest_note(
         if criterion.name != other.name and not _broken(
             solve_equilibrium(start.stance, other), friction
         ):
+            if repetition_notes(start.stance):
+                remedies.clear()  # within limits too it shares by next to nothing
             remedies.append(f"another criterion: {other.name} holds it as it is")
     except CopsenseError:
         pass

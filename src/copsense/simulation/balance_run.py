@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 from copsense.controllers import (
@@ -19,7 +20,7 @@ from copsense.controllers import (
     lateral_reference,
 )
 from copsense.criterion import Criterion, check_criterion, minimum_torque
-from copsense.errors import InvalidInputError
+from copsense.errors import InvalidInputError, UndeterminedWrenchError
 from copsense.freedom import hanging_notes, repetition_notes
 from copsense.limits import Limits, check_limits
 from copsense.simulation.control_loop import rollout
@@ -31,6 +32,7 @@ from copsense.simulation.scenario import Scenario
 from copsense.simulation.timed_prediction import timed_note
 from copsense.stance import Stance, check_stance
 from copsense.statics import with_tie_breaks
+from copsense.statics.tie_breaks import TIE_BREAK, tie_break_note
 
 _ENGINE_SHARES = (
     "The engine shares the forces that no motor feels by how its contacts yield, not by the "
@@ -109,9 +111,16 @@ def balance(
             notes = (*notes, _ENGINE_SHARES)
     if controller is None:
         assert predicted is not None
-        controller = BalancingController(
-            stance, predicted, gains, limits=limits, feedforward=feedforward
-        )
+        build = partial(BalancingController, gains=gains, limits=limits, feedforward=feedforward)
+        try:
+            controller = build(stance, predicted)
+        except UndeterminedWrenchError:
+            # Statics take the least of forces that motors feel within rounding alone.
+            if predicted.tie_break is not None:
+                raise
+            predicted = replace(predicted, tie_break=TIE_BREAK)
+            notes = (tie_break_note(predicted.name), _ENGINE_SHARES)
+            controller = build(stance, predicted)
     ground = scenario.friction_at_start(stance, simulator.settings.friction)
     prediction = None if predicted is None else predict(path, predicted, limits, ground)
     scenario = replace(scenario, reference=path)

@@ -9,15 +9,21 @@ import numpy as np
 
 from copsense.controllers import BalancingController, Controller
 from copsense.controllers.target import PathReference
-from copsense.freedom import repetition_notes, straight_note
+from copsense.criterion import minimum_wrench
+from copsense.errors import CopsenseError
+from copsense.freedom import missing_joints, repetition_notes, straight_note
 from copsense.listing import listed
+from copsense.simulation.at_rest import at_rest_note
+from copsense.simulation.physics_settings import PhysicsSettings
 from copsense.simulation.prediction import StaticPrediction, farther_side
 from copsense.simulation.recording import Recording
 from copsense.simulation.scenario import Scenario
 from copsense.stance import Stance
+from copsense.statics import solve_equilibrium
 
 _NEAR = 0.9  # of the static excursion, from which statics have foretold it
 _SAME = 1e-6  # Nm: torques that differ by less are the same
+_OTHER = "another criterion (--criterion minimum-wrench, criterion=minimum_wrench(1.0))"
 _OUTSIDE = 1e-3  # m, or share of the weight: what is less out of the ground's reach is on its edge
 
 
@@ -42,7 +48,11 @@ def likely_cause(
     """
     if recording.end.kind == "stopped" or (recording.completed and recording.tip is None):
         return ""
-    known = _foretold(recording, scenario, prediction) or _disturbed(scenario, recording)
+    known = (
+        _unfelt(stance, scenario, controller, prediction)
+        or _foretold(recording, scenario, prediction)
+        or _disturbed(scenario, recording)
+    )
     if known or not isinstance(controller, BalancingController):
         statics = (
             "what statics say of it is not known without its criterion (--criterion)"
@@ -61,12 +71,39 @@ def likely_cause(
     )
 
 
+def _unfelt(
+    stance: Stance,
+    scenario: Scenario,
+    controller: Controller,
+    prediction: StaticPrediction | None,
+) -> str:
+    """Forces that no ground gives, asked for between contacts that all but repeat each other."""
+    if prediction is None or not prediction.at_rest:
+        return ""
+    if not isinstance(controller, BalancingController) or not repetition_notes(stance):
+        return ""
+    start, other = prediction.start.equilibrium, minimum_wrench(1.0)
+    ground = scenario.friction_at_start(stance, PhysicsSettings.friction)
+    try:
+        held = solve_equilibrium(stance, other)
+    except CopsenseError:
+        return ""
+    if at_rest_note(held, other, ground):
+        return ""
+    here, there = (float(np.linalg.norm(at.torques)) for at in (start, held))
+    return (
+        f"{_repeated(stance)}. For a torque norm of {here:.4g} Nm where {other.name} needs "
+        f"{there:.4g} Nm, {controller.criterion.name} asks for forces between them that no ground "
+        f"gives. Take {_OTHER}."
+    )
+
+
 def _foretold(recording: Recording, scenario: Scenario, prediction: StaticPrediction | None) -> str:
     """What statics say of the posture, or of a reference that goes too far or too fast."""
     if prediction is None:
         return ""
     if prediction.at_rest:
-        return "the posture cannot be held at rest so; a note says what yields, and what can."
+        return "the ground cannot give what holds it at rest; a note says what, and the remedy."
     if recording.tip is None or not isinstance(scenario.reference, PathReference):
         return ""
     travel, fast = recording.tip_travel, prediction.quasi_static
@@ -117,13 +154,22 @@ def _slack(stance: Stance, controller: BalancingController) -> str:
     straight = straight_note(stance)
     if straight:
         return straight
-    if not repetition_notes(stance):
+    weighs_wrenches = bool(controller.criterion.at(stance).wrench.any())
+    if weighs_wrenches or not repetition_notes(stance):
         return ""
+    remedy = f"Take {_OTHER}."
+    if not missing_joints(stance):
+        remedy = f"Move the posture, or take {_OTHER}."
     return (
-        f"contacts that all but repeat each other: {controller.criterion.name} shares the forces "
-        "between them by next to nothing; a note says which. Move the posture, or take another "
-        "criterion (--criterion minimum-wrench)."
+        f"{_repeated(stance)}. {controller.criterion.name} shares the forces between them by next "
+        f"to nothing. {remedy}"
     )
+
+
+def _repeated(stance: Stance) -> str:
+    """That contacts all but repeat each other, and the joints for lack of which they do."""
+    lacking = "; ".join(missing_joints(stance))
+    return "contacts that all but repeat each other" + (f": {lacking}" if lacking else "")
 
 
 def _out_of_reach(recording: Recording, stance: Stance) -> str:
