@@ -30,6 +30,8 @@ DIALECT = {
     r"(?:wrench|control) laws?": "policy",
     r"(?<!there )(?:is|are) no (?!longer|more|less|(?:one|way|need|such|other)\b)[a-z]+": "not a",
 }
+# Keywords of Python alone that are called as an option is that asks for something else.
+OTHER_WORDS = {"frame", "gains", "robot", "within"}
 WORDS = re.compile(r"\b(?:" + "|".join(f"({pattern})" for pattern in DIALECT) + r")\b", re.I)
 
 
@@ -70,3 +72,37 @@ def test_source_and_pages_speak_the_words_of_the_field(modules):
             around = line[max(match.start() - 40, 0) : match.end() + 40]
             found.append(f"{path.relative_to(ROOT)}: rather {rather}: ... {around} ...")
     assert not found, "\n".join(found)
+
+
+def messages(source):
+    """Texts of a module that are shown, f-strings whole; docstrings left out."""
+    nodes = list(ast.walk(ast.parse(source)))
+    bodies = [
+        n.body[0] for n in nodes if isinstance(n, ast.Module | ast.FunctionDef | ast.ClassDef)
+    ]
+    apart = {id(n.value) for n in bodies if isinstance(n, ast.Expr)}
+    apart |= {id(v) for n in nodes if isinstance(n, ast.JoinedStr) for v in n.values}
+    for node in nodes:
+        if id(node) not in apart and isinstance(node, ast.JoinedStr | ast.Constant):
+            parts = node.values if isinstance(node, ast.JoinedStr) else [node]
+            yield "".join(str(p.value) if isinstance(p, ast.Constant) else "..." for p in parts)
+
+
+def test_a_remedy_in_python_names_the_option_that_does_the_same(modules):
+    cli = [source for path, source in modules.items() if path.parent.name == "cli"]
+    options = {o for source in cli for o in re.findall(r'"--([a-z-]+)"', source)}
+    one_sided = []
+    for path, source in modules.items():
+        for text in messages(source):
+            for keyword in set(
+                re.findall(r"(?<![\w-])([a-z_]+)=(?=[\[('\"{ ,;)]|\.(?!\.)|[A-Z]\w)", text)
+            ):
+                name = keyword.replace("_", "-")
+                same = (
+                    options & {name, name.removesuffix("s")} if keyword not in OTHER_WORDS else ()
+                )
+                if same and not any(f"--{option}" in text for option in same):
+                    one_sided.append(f"{path.relative_to(ROOT)}: {keyword}= in {text!r}")
+            if "tie_break such" in text and "--criterion" not in text:
+                one_sided.append(f"{path.relative_to(ROOT)}: {text!r}")
+    assert not one_sided, "\n".join(one_sided)

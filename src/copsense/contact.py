@@ -72,7 +72,8 @@ class Plane:
             _require(
                 not steep,
                 f"the {what} of a slope is {np.degrees(angle):.4g} degrees. Give less than 90, or "
-                f"a wall by its normal, Plane(point, normal). {in_radians(angle).rstrip('.')}",
+                "a wall by its normal, Plane(point, normal) (--plane). "
+                f"{in_radians(angle).rstrip('.')}",
             )
         normal = pin.rpy.rpyToMatrix(float(roll), float(pitch), 0.0)[:, 2]
         x, y, z = (float(c) for c in normal)

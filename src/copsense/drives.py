@@ -294,8 +294,9 @@ class Drives(ShortRepr):
         for each in self.transmissions:
             if shared := idle.intersection(each.joints):
                 raise InvalidInputError(
-                    f"joint {min(shared)!r} is driven by {', '.join(each.motors)}. Give drives "
-                    "without that transmission (drives=Drives(...))."
+                    f"joint {min(shared)!r} is driven by {', '.join(each.motors)}. Leave it out of "
+                    "passive= (--passive), or give drives without that transmission "
+                    "(drives=Drives(...))."
                 )
         return replace(self, motors=tuple(j for j in self._own(names) if j not in idle))
 

@@ -460,7 +460,7 @@ def _cone_rows(contact: Contact, mu: float | None, sides: int) -> list[Row]:
         raise InvalidInputError(
             f"the sole of {contact.name!r} has {len(sole)} vertices; its exact wrench cone "
             f"is made for {_CONE_VERTICES} at most. Give a simpler polygon, such as "
-            "rectangle(...)."
+            "rectangle(...) (--sole X0:X1:Y0:Y1)."
         )
     faces = unit_cone(sole, mu, sides)
     return [("wrench cone", f"wrench cone, face {i}", row, 0.0) for i, row in enumerate(faces)]

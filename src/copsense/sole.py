@@ -105,7 +105,7 @@ def read_sole(
         raise ModelLoadError(
             f"the {geometry} geometry under frame {contact.frame!r} touches the ground in a single "
             f"point: it has no sole{why}. {remedy[0].upper()}{remedy[1:]} a point contact, or give "
-            "the polygon."
+            "the polygon (--sole X0:X1:Y0:Y1)."
         )
     width, depth = np.ptp(vertices[:, :2], axis=0)
     return Sole(lowest, outline.vertices, upright, (float(width), float(depth)))

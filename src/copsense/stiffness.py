@@ -105,7 +105,7 @@ def critical_stiffness(stance: Stance, criterion: Criterion) -> float:
     if quadratic.inertia or not quadratic.active.all():
         raise InvalidInputError(
             f"criterion {criterion.name!r} does not give every joint a stiffness. Use "
-            "copsense.stiffness.stiffness with a number for each."
+            "copsense.stiffness.stiffness (--criterion stiffness:...) with a number for each."
         )
     equilibrium = solve_equilibrium(stance, criterion)
     robot, J = stance.robot, stance.constraints

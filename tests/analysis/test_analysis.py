@@ -97,7 +97,7 @@ def test_printed_it_is_the_command_s_table(analysis, limited):
     lines = command("analyse", "icub", "--along", "l_hip_roll").out
     assert lines.rstrip("\n") == str(analysis)
     assert repr(analysis).startswith(str(analysis))
-    assert "note: contact 'l_sole' lies 10.5 mm over" in repr(analysis)
+    assert "note: contacts 'l_sole' and 'r_sole' lie 10.5 mm over" in repr(analysis)
     assert "CoM to +y:   45.9 mm to r_sole" in str(limited)
     assert len(repr(analysis)) < 3000
 

@@ -112,7 +112,8 @@ class ShareByCriterion:
             return np.asarray(forces - Z @ (Z.T @ forces))
         raise UndeterminedWrenchError(
             f"criterion {self.criterion.name!r} leaves {Z.shape[1]} direction(s) of the contact "
-            "forces undetermined. Give it a tie_break such as minimum_wrench(1.0)."
+            "forces undetermined. Give it a tie_break such as minimum_wrench(1.0), or take that "
+            "alone (--criterion minimum-wrench)."
         )
 
     def choices(self, problem: LoadProblem, Z: Float[np.ndarray, "m z"]) -> list[Choice]:

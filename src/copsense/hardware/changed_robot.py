@@ -112,7 +112,7 @@ def _with_servos(
     if not isinstance(first, TorqueTerm):
         raise InvalidInputError(
             f"criterion {criterion.name!r} has no stiffnesses of joints. Use "
-            "copsense.stiffness.stiffness."
+            "copsense.stiffness.stiffness (--criterion stiffness:...)."
         )
     compliances = np.diag(criterion.at(stance).torque).copy()
     for change, d in steps:

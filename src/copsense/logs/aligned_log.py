@@ -127,7 +127,8 @@ def align_log(
     if base == "recorded":
         if log.base is None:
             raise InvalidInputError(
-                f"{log.source} has no base pose. Leave the base to the feet (base='feet')."
+                f"{log.source} has no base pose. Leave the base to the feet (base='feet', --base "
+                "feet)."
             )
         stand = partial(_recorded, model, log.base, log.base_frame)
         known &= np.isfinite(log.base).all(axis=1)

@@ -117,7 +117,7 @@ def stand_on_feet(
     if surface is None and len(contacts) < 3:
         raise InvalidInputError(
             f"{len(contacts)} point contact(s) do not say where the base is. Give three or more, "
-            "or base='recorded' with a log that has it."
+            "or base='recorded' (--base recorded) with a log that has it."
         )
     points = np.empty((len(q), len(contacts), 3))
     for i, row in enumerate(q):

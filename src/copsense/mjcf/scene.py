@@ -123,5 +123,6 @@ def _likely(mj: Any) -> int:
     choices = first_few(_described(mj, t) for t in (limbed or sorted(free) or trees))
     raise InvalidInputError(
         f"the MJCF holds several things that could be the robot: {choices}. Name the contacts "
-        "(contacts=[...], --contact FRAME), or say which with load_robot(..., root=BODY)."
+        "(contacts=[...], --contact FRAME), or say which with load_robot(..., root=BODY) "
+        "(--root BODY)."
     )

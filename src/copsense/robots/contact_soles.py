@@ -10,6 +10,7 @@ import numpy as np
 
 from copsense.contact import Contact
 from copsense.errors import CopsenseError, ModelLoadError
+from copsense.listing import listed
 from copsense.robot import Robot
 from copsense.robots.presets import Preset
 from copsense.shapes import Geometry
@@ -88,8 +89,8 @@ def complete_contacts(
             away = abs(sole.height - up @ offset) * 1e3
             warnings.warn(
                 f"contact {contact.name!r} is {away:.1f} mm from the bottom of its collision "
-                "geometry. Give contact_at='sole' to put it there, or contact_at='frame' to keep "
-                "it.",
+                "geometry. Give contact_at='sole' (--contact-at sole) to put it there, or "
+                "contact_at='frame' (--contact-at frame) to keep it.",
                 ContactGeometryWarning,
                 stacklevel=3,
             )
@@ -124,8 +125,8 @@ def tip_text(contact: Contact, sole: Sole) -> str:
 
 
 def soles_read(stance: Stance) -> tuple[str, ...]:
-    """The soles that a stance has from its robot's geometry, a sentence each."""
-    found = []
+    """The soles that a stance has from its robot's geometry, a sentence for those alike."""
+    found: dict[tuple[str, Geometry], list[str]] = {}
     for contact in stance.contacts:
         for geometry in get_args(Geometry):
             if contact.kind != "surface" or contact.polygon is None:
@@ -137,12 +138,14 @@ def soles_read(stance: Stance) -> tuple[str, ...]:
             if np.array_equal(contact.polygon, sole.polygon):
                 turn = float(np.degrees(np.arccos(min(1.0, contact.normal[2]))))
                 turned = f"; turned by {turn:.1f} deg to lie flat" if 0 < turn < _LEANING else ""
-                found.append(
-                    f"{contact.name}: sole {sole_text(contact, sole)}{turned}; read from its "
-                    f"{geometry} geometry."
-                )
+                alike = f"sole {sole_text(contact, sole)}{turned}", geometry
+                found.setdefault(alike, []).append(contact.name)
                 break
-    return tuple(found)
+    return tuple(
+        f"{listed(names)}: {sole}; read from {'their' if len(names) > 1 else 'its'} {geometry} "
+        "geometry."
+        for (sole, geometry), names in found.items()
+    )
 
 
 def sole_notes(stance: Stance) -> tuple[str, ...]:
@@ -150,7 +153,7 @@ def sole_notes(stance: Stance) -> tuple[str, ...]:
 
     Contacts whose geometry cannot be read are passed over.
     """
-    notes = []
+    off: dict[str, list[str]] = {}
     for contact in stance.contacts:
         if contact.kind != "surface":
             continue
@@ -160,9 +163,11 @@ def sole_notes(stance: Stance) -> tuple[str, ...]:
             continue
         over = float(contact.rotation[:, 2] @ np.array(contact.offset)) - sole.height
         if abs(over) > _OFF_SOLE:
-            notes.append(
-                f"contact {contact.name!r} lies {abs(over) * 1e3:.1f} mm "
-                f"{'over' if over > 0 else 'under'} the bottom of its collision geometry; "
-                "contact_at='sole' (--contact-at sole) puts it there."
-            )
-    return tuple(notes)
+            how = f"{abs(over) * 1e3:.1f} mm {'over' if over > 0 else 'under'} the bottom of"
+            off.setdefault(how, []).append(repr(contact.name))
+    return tuple(
+        f"contact{'s' * (len(names) > 1)} {listed(names)} lie{'s' * (len(names) == 1)} {how} "
+        f"{'their' if len(names) > 1 else 'its'} collision geometry; contact_at='sole' "
+        f"(--contact-at sole) puts {'them' if len(names) > 1 else 'it'} there."
+        for how, names in off.items()
+    )

@@ -127,7 +127,7 @@ def _add_joint(mujoco: Any, robot: Robot, i: int, body: Any, place: pin.SE3) -> 
     if not kind.startswith((*_HINGES, *_SLIDES)) or joint.nv != 1 or not _unit(subspace):
         raise InvalidInputError(
             f"joint {model.names[i]!r} of robot {robot.name!r} is a {kind}, which cannot be "
-            "simulated. Lock it: robot.keeping([...])."
+            "simulated. Lock it: robot.keeping([...]) (--lock JOINT)."
         )
     hinge = bool(np.any(subspace[3:]))
     body.add_joint(

@@ -345,12 +345,14 @@ class _Problem:
                 raise UndeterminedWrenchError(
                     f"within limits, criterion {self.criterion.name!r} leaves the forces in the "
                     "loops undetermined, which motors feel and it does not weigh. Give it a share "
-                    "of the torques: mixed((criterion, 1.0), (minimum_torque(), 1e-3))."
+                    "of the torques, mixed((criterion, 1.0), (minimum_torque(), 1e-3)), or take "
+                    "these alone (--criterion minimum-torque)."
                 )
             raise UndeterminedWrenchError(
                 f"criterion {self.criterion.name!r} leaves wrenches undetermined. Give it a "
-                "tie_break such as minimum_wrench(1.0), or a small share of another criterion: "
-                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3))."
+                "tie_break such as minimum_wrench(1.0), a small share of another criterion, "
+                "mixed((criterion, 1.0), (minimum_wrench(1.0), 1e-3)), or take that alone "
+                "(--criterion minimum-wrench)."
             )
         self.second: Quadratic = second.at(self.stance)
         if self.second.inertia:
@@ -563,6 +565,6 @@ class _Problem:
             raise InvalidInputError(
                 "the tie-break alone presses on "
                 f"{', '.join(self.names[i] for i in alone)}, and when it lets go is not followed. "
-                "Give the criterion a small share of another instead: mixed((criterion, 1.0), "
-                "(minimum_wrench(1.0), 1e-3))."
+                "Give the criterion a small share of another instead, mixed((criterion, 1.0), "
+                "(minimum_wrench(1.0), 1e-3)), or take that alone (--criterion minimum-wrench)."
             )

@@ -236,6 +236,6 @@ def _undetermined(
         f"criterion {criterion.name!r} leaves {free.shape[1]} direction(s) of the wrenches "
         f"undetermined at this stance, in {', '.join(rows)} (contact Jacobian: rank {stance.rank} "
         f"of {len(stance.constraints)} rows). Give it a tie_break such as minimum_wrench(1.0), "
-        "or bend a straight leg.",
+        "take that alone (--criterion minimum-wrench), or bend a straight leg.",
         rows,
     )
