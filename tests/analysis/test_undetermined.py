@@ -33,12 +33,16 @@ def test_internal_forces_are_decided_by_a_tie_break_that_is_said(heel_and_toe):
     np.testing.assert_array_equal(found.equilibria["minimum-torque"].forces, expected.forces)
 
 
-def test_its_region_within_limits_is_that_of_the_tied_criterion(heel_and_toe):
+def test_its_region_within_limits_is_that_of_the_tied_criterion_and_says_so(heel_and_toe):
     torque, limits = minimum_torque(), copsense.Limits(friction=0.5)
     found = com_regions(heel_and_toe, [torque, minimum_wrench(1.0)], limits)
     tied = with_tie_break(heel_and_toe, torque)
     expected = criterion_region(heel_and_toe, tied, limits)
     np.testing.assert_array_equal(found.unclipped["minimum-torque"].polygon, expected.polygon)
+    assert found.criteria == {"minimum-torque": tied, "minimum-wrench": minimum_wrench(1.0)}
+    (note,) = found.notes
+    assert note.startswith("minimum-torque")
+    assert repr(found).endswith(f"note: {note}")
 
 
 def test_a_criterion_that_determines_is_left_as_it_is(icub, heel_and_toe):

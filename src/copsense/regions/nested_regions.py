@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,16 +35,20 @@ class ComRegions(Mapping[str, ComRegion]):
         supported: an equilibrium exists within all but the torque limits.
         actuated: one exists within the torque limits too; None without any.
         unclipped: criterion -> where its own wrenches stay within all limits.
+        criteria: name -> the criterion asked about, with the tie-break that it needed.
+        notes: a sentence for each criterion that was given a tie-break.
     """
 
     com: Float[np.ndarray, " 2"]
     supported: ComRegion
     actuated: ComRegion | None
     unclipped: Mapping[str, ComRegion]
+    criteria: Mapping[str, Criterion] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Own the position and the mapping."""
-        freeze(self, "com", "unclipped")
+        """Own the position and the mappings."""
+        freeze(self, "com", "unclipped", "criteria")
 
     def __getitem__(self, name: str) -> ComRegion:
         """The region of a name."""
@@ -59,13 +63,13 @@ class ComRegions(Mapping[str, ComRegion]):
         return len(self._named)
 
     def __repr__(self) -> str:
-        """A line for each region: its area, and how far the CoM is inside."""
+        """A line for each region: its area, and how far the CoM is inside; then the notes."""
         width = max(map(len, self))
         lines = (
             f"  {name:{width}}  {region!r}, the CoM {self.margins[name] * 1e3:+.1f} mm inside"
             for name, region in self.items()
         )
-        return "\n".join(["ComRegions:", *lines])
+        return "\n".join(["ComRegions:", *lines, *(f"note: {note}" for note in self.notes)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data of each region, as ``copsense analyse --regions ... --json`` prints it.
@@ -110,7 +114,8 @@ def com_regions(
     Args:
         stance: the posture.
         criteria: whose own wrenches are asked about, each of another name. One that leaves forces
-            undetermined that contacts exert against each other gets a tie-break.
+            undetermined that contacts exert against each other gets a tie-break, which the result
+            names.
         limits: what the wrenches and torques must respect.
         tolerance: of `com_region` [m].
 
@@ -123,7 +128,7 @@ def com_regions(
     check_stance(stance)
     check_limits(limits)
     named = named_criteria(criteria, "a comparison of regions", policies=False)
-    chosen, _ = with_tie_breaks([stance], named)  # as an analysis of the posture does
+    chosen, notes = with_tie_breaks([stance], named)  # as an analysis of the posture does
     actuated = None
     if limits.torque is not None:
         actuated = com_region(stance, limits, tolerance=tolerance)
@@ -132,4 +137,6 @@ def com_regions(
         com_region(stance, replace(limits, torque=None), tolerance=tolerance),
         actuated,
         {name: criterion_region(stance, c, limits) for name, c in chosen.items()},
+        chosen,
+        notes,
     )
