@@ -540,13 +540,16 @@ class _Along:
 
 
 def _level(stance: Stance, coordinate: str) -> _Along:
-    """Postures of a level path: the other level coordinate held where the stance has it."""
+    """Postures of a level path: the other level coordinate held where the stance has it.
+
+    Where contacts hold that one, it stays within rounding, and is not asked for as well.
+    """
     if coordinate not in COM_COORDINATES[:2]:
         raise UnknownNameError("level coordinate of the CoM", coordinate, COM_COORDINATES[:2])
-    other = COM_COORDINATES[1 - COM_COORDINATES.index(coordinate)]
+    other = 1 - COM_COORDINATES.index(coordinate)
     # A planar robot has no x to hold.
-    level = stance.robot.base_nv == 6
-    held = {other: float(stance.com[COM_COORDINATES.index(other)])} if level else {}
+    level = stance.robot.base_nv == 6 and other not in held_com_axes(stance)
+    held = {COM_COORDINATES[other]: float(stance.com[other])} if level else {}
     return _Along(stance, coordinate, held, None)
 
 

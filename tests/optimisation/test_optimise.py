@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from support.walkers import BIPED, NO_ANKLE_ROLL, bent, walker
 
 import copsense
 from copsense.batch import PostureChart
@@ -230,6 +231,19 @@ def test_a_search_that_is_cut_short_says_what_it_reached(icub):
     assert "not proven" in str(short)
     for before, after in zip(icub.placements, short.stance.placements, strict=True):
         np.testing.assert_allclose(after.homogeneous, before.homogeneous, atol=1e-9)
+
+
+def test_motions_that_contacts_hold_fast_do_not_hold_the_search_up():
+    """Without ankle roll the pelvis' roll is held to second order, which no gradient shows."""
+    text = walker(NO_ANKLE_ROLL)
+    legs = copsense.load_stance(text, contacts=BIPED, contact_at="sole", posture=bent(0.8))
+    found = optimise(legs, over=["com_x"], starts=1)
+    assert found.converged
+    assert found.iterations < 50
+    assert found.after.worth("travel") == pytest.approx(0.1, abs=1e-6)  # half a sole
+    assert "over 1 m" in str(found).splitlines()[3]  # sideways the CoM stays
+    with pytest.raises(InvalidInputError, match="hold roll fast"):
+        optimise(legs, over=["roll"], starts=1)
 
 
 @pytest.fixture(scope="module")

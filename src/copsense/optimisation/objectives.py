@@ -56,12 +56,12 @@ class Quantity:
         """The quantity, from its rows."""
         return float(self.sign * (self.sign * rows).min())
 
-    def shown(self, value: float) -> str:
-        """A value with its unit, as people read it."""
+    def shown(self, value: float, digits: int = 2) -> str:
+        """A value with its unit, as people read it; of a length so many digits of its mm."""
         if math.isnan(value):
             return "none"
         if self.unit == "m":
-            return f"{value * 1e3:.2f} mm"
+            return f"over {_FAR:g} m" if value >= _FAR else f"{value * 1e3:.{digits}f} mm"
         return f"{value:.4g}" + ("" if self.unit == "1" else f" {self.unit}")
 
 

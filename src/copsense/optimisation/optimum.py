@@ -12,7 +12,7 @@ from copsense.content import ShortRepr, freeze
 from copsense.criterion import Criterion
 from copsense.json_data import json_data
 from copsense.limits import Limits
-from copsense.optimisation.objectives import QUANTITIES
+from copsense.optimisation.objectives import QUANTITIES, TRAVELS
 from copsense.optimisation.variables import shown
 from copsense.sensitivity import CopSensitivity, cop_sensitivity
 from copsense.stance import Stance
@@ -83,6 +83,12 @@ class Valuation(ShortRepr):
     def __post_init__(self) -> None:
         """Own the mappings."""
         freeze(self, "quantities", "coordinates", "parameters")
+
+    def worth(self, objective: str) -> float:
+        """What counts of an objective: of travels the exact ones too, in the objective's unit."""
+        if objective == "travel":
+            return self.smallest_travel
+        return self.sideways_travel if objective == "sideways" else self.quantities[objective]
 
     @cached_property
     def sensitivity(self) -> CopSensitivity:
@@ -174,14 +180,9 @@ class Optimum(ShortRepr):
     def verdict(self) -> str:
         """One sentence: what it gains."""
         quantity = QUANTITIES[self.objective]
-        a, b = (v.quantities[self.objective] for v in (self.before, self.after))
-        what = self.objective
-        if self.objective == "travel":
-            a, b = self.before.smallest_travel, self.after.smallest_travel
-            what = "smallest travel"
-        if self.objective == "sideways":
-            a, b = self.before.sideways_travel, self.after.sideways_travel
-            what = "exact travel to both sides"
+        a, b = (v.worth(self.objective) for v in (self.before, self.after))
+        names = {"travel": "smallest travel", "sideways": "exact travel to both sides"}
+        what = names.get(self.objective, self.objective)
         if not math.isfinite(a) or a == 0:
             return f"{what} {quantity.shown(b)}, where there was none"
         return f"{what} {quantity.shown(a)} -> {quantity.shown(b)} ({(b / a - 1) * 100:+.1f} %)"
@@ -277,12 +278,12 @@ class Front(ShortRepr):
         for point in self.points:
             a, b = (point.after.quantities[q.name] for q in (first, second))
             lines.append(
-                f"{first.shown(a):>12}  {second.shown(b):>12}  "
+                f"{first.shown(a, 1):>12}  {second.shown(b, 1):>12}  "
                 f"{point.after.exact_travel * 1e3:17.1f}  {point.residual:12.1e}"
             )
         a, b = (self.before.quantities[q.name] for q in (first, second))
         lines.append(
-            f"{first.shown(a):>12}  {second.shown(b):>12}  "
+            f"{first.shown(a, 1):>12}  {second.shown(b, 1):>12}  "
             f"{self.before.exact_travel * 1e3:17.1f}  before"
         )
         return "\n".join(lines)
@@ -350,7 +351,9 @@ def _proof(found: Optimum) -> list[str]:
     shown_as = QUANTITIES[found.objective].shown
     starts = ", ".join("none" if math.isnan(v) else shown_as(v) for v in found.starts)
     kept = "a local optimum" if found.converged else "not proven to be an optimum"
+    count = len(found.starts)
+    order = ", to first order" if found.objective in TRAVELS else ""
     return [
         f"KKT residual {found.residual:.1e}: {kept}; {found.iterations} iterations; the search "
-        f"reached from {len(found.starts)} starts: {starts}"
+        f"reached from {count} start{'s' * (count != 1)}{order}: {starts}"
     ]

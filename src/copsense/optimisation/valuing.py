@@ -10,7 +10,7 @@ from jaxtyping import Float
 from copsense.criterion import Criterion
 from copsense.errors import CopsenseError
 from copsense.limits import Limits
-from copsense.optimisation.objectives import QUANTITIES, way_of
+from copsense.optimisation.objectives import QUANTITIES, TRAVELS, way_of
 from copsense.optimisation.optimum import PROVEN, Binding, ExactTravel, Optimum, Valuation
 from copsense.optimisation.posture_program import PostureProgram
 from copsense.optimisation.question import Question
@@ -104,15 +104,23 @@ def optimum_of(
     said = list(notes)
     values = [v for v in reached if math.isfinite(v)]
     if len(values) > 1 and np.ptp(values) > _SPREAD * max(map(abs, values)):
+        order = " to first order" if objective in TRAVELS else ""
         said.append(
             f"the starts ended in different optima, {quantity.shown(min(values))} to "
-            f"{quantity.shown(max(values))}: more --starts may find a better one."
+            f"{quantity.shown(max(values))}{order}: more starts (--starts) may find a better one."
         )
-    if not best.finished or best.residual > PROVEN:
+    there = f"{quantity.shown(after.worth(objective))} was reached"
+    if not best.finished:
         said.append(
             f"the solver stopped early ({best.message}; at most {iterations} iterations from a "
-            f"start): {quantity.shown(after.quantities[objective])} was reached, with a KKT "
-            f"residual of {best.residual:.1e}. More --iterations may go farther."
+            f"start): {there}, with a KKT residual of {best.residual:.1e}. More iterations "
+            "(--iterations) may go farther."
+        )
+    elif best.residual > PROVEN:
+        said.append(
+            f"the solver ended by itself: {there}, but the KKT residual of {best.residual:.1e} is "
+            f"over {PROVEN:g}, so that this is not proven to be an optimum. Other starts "
+            "(--starts, --seed) may go farther."
         )
     units = dict(zip(variables.plan.names, variables.plan.units, strict=True))
     return Optimum(

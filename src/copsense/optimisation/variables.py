@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
@@ -28,7 +29,7 @@ from copsense.batch.postures.coordinates import (
 from copsense.content import ShortRepr
 from copsense.design import Family
 from copsense.errors import InvalidInputError, UnknownNameError
-from copsense.freedom import com_held
+from copsense.freedom import com_held, missing_joints
 from copsense.path import COM_COORDINATES
 from copsense.stance import Stance
 
@@ -37,6 +38,7 @@ Range = tuple[float, float]
 _TENTH = 10.0  # of a metre, per unit of a variable
 _TURN = math.radians(20.0)  # of the base about its axes, unless a range is given
 _ROOM = 0.2  # of the CoM's height, how far the CoM goes, likewise
+_PROBE, _FAST = 1e-5, 1e-6  # of a motion: its length, and the least share that moves a coordinate
 _FREE = math.pi  # rad: of a joint without limits, likewise
 GROUPS = ("com", "turn", "joints", "feet")
 """Names that stand for several coordinates; see `expand`."""
@@ -155,7 +157,7 @@ def _groups(stance: Stance) -> dict[str, list[str]]:
     carry = {stance.robot.model.names[joint] for c in stance.contacts for joint in stance.limb(c)}
     return {
         "com": [n for n in COM_COORDINATES if n in valid and com_moves(stance, n)],
-        "turn": [n for n in BASE[3:] if n in valid],
+        "turn": [n for n in BASE[3:] if n in valid and BASE.index(n) not in _held_fast(stance)],
         "joints": [n for n in stance.robot.joint_names if n in valid and n not in carry],
         "feet": [n for n in valid if n.endswith((":x", ":y"))],
     }
@@ -234,15 +236,25 @@ def variables_of(
             "of their own: it cannot be optimised. Lock or couple them (--lock, --couple), or look "
             "for postures with copsense map."
         )
+    fast = set() if any(":" in name for name in ranges) else _held_fast(stance)
     for name in ranges:
         if name in COM_COORDINATES and (held := com_held(stance, COM_COORDINATES.index(name))):
             raise InvalidInputError(held)
     plan = chart_coordinates(stance, tuple(ranges))
+    for name, place in zip(plan.names, plan.place, strict=True):
+        if int(place) in fast:
+            lacking = "; ".join(missing_joints(stance))
+            raise InvalidInputError(
+                f"the contacts of {robot.name!r} hold {name} fast: no posture with them in place "
+                "moves it."
+                + (f" {lacking[0].upper()}{lacking[1:]}." if lacking else "")
+                + " Let another coordinate vary."
+            )
     moved = {u for limb in plan.limbs for u in limb.unknowns if ranges}
     closing = _closing(stance, moved | {int(p) for p in plan.place})
     if closing:  # loops and couplings tie base and limbs together
         moved |= {*range(robot.base_nv), *closing}
-    index = np.array(sorted({int(p) for p in plan.place} | moved), dtype=int)
+    index = np.array(sorted(({int(p) for p in plan.place} | moved) - fast), dtype=int)
     labels, units = _labels(stance)
     low, high = np.full(len(plan.given), -np.inf), np.full(len(plan.given), np.inf)
     below, above = [""] * len(low), [""] * len(low)
@@ -305,6 +317,28 @@ def variables_of(
         ),
         family,
     ), rest
+
+
+def _held_fast(stance: Stance) -> set[int]:
+    """Which of a plan's given numbers no motion moves, where contacts hold some to second order.
+
+    As base roll and hip roll on legs without ankle roll. The solver would see them free at every
+    posture in place, and creep.
+    """
+    if not stance.false_motions.shape[1]:
+        return set()
+    model, names = stance.robot.model, coordinate_names(stance)
+    moves = np.zeros(model.nv, dtype=bool)
+    for motion in stance.admissible_motions.T:
+        ahead, behind = (
+            stance.at(pin.integrate(model, stance.q, step * motion), check=False)
+            for step in (_PROBE, -_PROBE)
+        )
+        rates = np.subtract(
+            *(chart_coordinates(s, names[:1]).given[: model.nv] for s in (ahead, behind))
+        )
+        moves |= np.abs(rates) > 2 * _PROBE * _FAST
+    return set(np.flatnonzero(~moves).tolist())
 
 
 def _closing(stance: Stance, moved: set[int]) -> set[int]:
