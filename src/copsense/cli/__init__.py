@@ -51,7 +51,7 @@ _COMMANDS = {
     "  copsense analyse icub --com-y 0.03\n"
     "  copsense sweep icub --com-y -0.07:0.07:57 --output icub.nc\n"
     "Each command's --help shows examples of its own.\n"
-    "Exit codes: 0 done, 1 some rows failed, 2 bad usage or input.",
+    "Exit codes: 0 done, 1 some rows failed or a robot fell, 2 bad usage or input.",
 )
 @click.version_option(__version__, "-V", "--version", prog_name="copsense")
 def copsense() -> None:

@@ -66,7 +66,10 @@ if TYPE_CHECKING:
     help=f"How far to the left the CoM goes: {REFERENCES}.",
 )
 @click.option(
-    "--duration", type=TIME, metavar="TIME", help="Default: one period, the ramp and 1 s, or 2 s."
+    "--duration",
+    type=TIME,
+    metavar="TIME",
+    help="How long; default one period of a sine, a ramp and 1 s, or 2 s.",
 )
 @controller_options
 @click.option(

@@ -80,7 +80,7 @@ def _standing_options(command: F) -> F:
 )
 @control_period_option
 @click.option("--repeats", type=int, metavar="N", help="Perturbed pushes of falls; default 20.")
-@click.option("--seed", type=int, metavar="N", help="Of the falls' perturbations; default 0.")
+@click.option("--seed", type=int, metavar="N", help="Seed of the falls' perturbations; default 0.")
 @click.option(
     "--jobs",
     type=click.IntRange(1),

@@ -24,7 +24,7 @@ def controller_options(command: F) -> F:
         click.option(
             "--controller",
             metavar="MODULE:NAME",
-            help="Your controller instead: a class made of the stance, or a function observation "
+            help="Your controller instead: a class made with the stance, or a function observation "
             "-> torques. A --criterion is then for the static prediction.",
         ),
         click.option(

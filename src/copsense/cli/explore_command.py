@@ -39,8 +39,8 @@ _NOT_WHERE_IT_STANDS = ("limits", "save_stance", "force_stance")  # of `standing
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Address of this machine to listen at; another than the default lets others on the "
-    "network knock, who need the token of the address.",
+    help="Address of this machine to listen at; another than the default can be reached from the "
+    "network, by the whole address with its token.",
 )
 @click.option("--no-browser", is_flag=True, help="Print the address alone; do not open it.")
 @click.option("--no-meshes", is_flag=True, help="Show the stick figure, not the robot's meshes.")
@@ -55,8 +55,8 @@ _NOT_WHERE_IT_STANDS = ("limits", "save_stance", "force_stance")  # of `standing
 @click.option(
     "--meshes",
     is_flag=True,
-    help="Put the robot's meshes into the page of --export, with who made them: giving the page on "
-    "gives them on.",
+    help="Put the robot's meshes into the page of --export, and name who made them: who passes "
+    "the page on passes them on.",
 )
 @click.option(
     "--recording",

@@ -57,9 +57,15 @@ MASS = Quantity("kg")
     help="L [m] of minimum-wrench and minimum-tangential.",
 )
 @click.option(
-    "--hip-weight", type=float, default=1.0, show_default=True, help="Of weighted-torque."
+    "--hip-weight",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Weight of the hips' torques in weighted-torque.",
 )
-@click.option("--ankle-weight", type=float, default=1.0, show_default=True, help="Likewise.")
+@click.option(
+    "--ankle-weight", type=float, default=1.0, show_default=True, help="The same of the ankles."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def four_bar(
     leg_length: float,

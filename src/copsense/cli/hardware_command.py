@@ -65,7 +65,7 @@ _COUNT, _MOST = 9, 1000
     default="10%",
     show_default=True,
     metavar="PERCENT",
-    help="Of its size, by which each parameter listed is changed for the check.",
+    help="By how much of its size each listed parameter is changed for the check.",
 )
 @click.option("--no-check", is_flag=True, help="Leave the checks by whole pipelines out.")
 @click.option(

@@ -48,7 +48,7 @@ def encoders_option(command: F) -> F:
         "--encoders",
         metavar="ANGLE",
         help="Standard deviation of each encoder's constant error, such as 0.5deg, which the "
-        "intervals then have in them; default none.",
+        "intervals then include; default none.",
     )(command)
 
 

@@ -111,13 +111,17 @@ _REQUIRE = "QUANTITY=VALUE, such as travel=40mm, push=20N or torque=15Nm"
     type=click.IntRange(1),
     default=600,
     show_default=True,
-    help="Of the solver, from each start, at most.",
+    help="Iterations of the solver from each start, at most.",
 )
 @click.option(
-    "--pareto", metavar="NAME", help="What the objective costs of this quantity: the Pareto front."
+    "--pareto", metavar="NAME", help="Trade the objective against this quantity: the Pareto front."
 )
 @click.option(
-    "--points", type=click.IntRange(2, 1000), default=7, show_default=True, help="Of the front."
+    "--points",
+    type=click.IntRange(2, 1000),
+    default=7,
+    show_default=True,
+    help="Postures on the front.",
 )
 @click.option(
     "--plot",
