@@ -76,6 +76,13 @@ def test_a_cut_divides_the_area(figure, angle, offset):
     assert again.area == pytest.approx(below.area, abs=1e-14)
 
 
+def test_a_cut_along_an_edge_leaves_the_edge():
+    """Where 0.008 + (-0.001 - 0.008) is not -0.001: a vertex met twice, within rounding."""
+    triangle = Polygon(np.array([[-0.001, 0.0], [0.008, 0.0], [-0.001, 0.003]]))
+    left = triangle.clip(np.array([1.0, 0.0]), -0.001)
+    np.testing.assert_allclose(np.sort(left.vertices[:, 1]), [0.0, 0.003], rtol=0, atol=1e-15)
+
+
 @law(figures(), NUMBER, st.sampled_from("xy"))
 def test_a_section_ends_on_the_boundary(figure, at, axis):
     polygon, _ = figure

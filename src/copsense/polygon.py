@@ -272,8 +272,12 @@ class Polygon:
                 kept.append([u + share * (x - u), v + share * (y - v)])
             if beyond[j] <= _ROUNDING:
                 kept.append([x, y])
-        # A vertex on the line may be met twice.
-        once = [p for i, p in enumerate(kept) if p != kept[i - 1] or len(kept) == 1]
+        # A vertex on the line may be met twice, the second time within rounding.
+        once = [
+            [x, y]
+            for i, (x, y) in enumerate(kept)
+            if max(abs(x - kept[i - 1][0]), abs(y - kept[i - 1][1])) > _ROUNDING or len(kept) == 1
+        ]
         return Polygon(np.array(once or kept[:1]).reshape(-1, 2))
 
     def within(
