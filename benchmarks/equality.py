@@ -35,7 +35,16 @@ from copsense.load_problem import LoadProblem
 from copsense.posture_system import supporting_joints
 
 ALLOWED = 1e-9
-WHAT = ("wrenches", "torques", "cops", "gradient", "com_gain", "com_travel", "tipping_edge")
+WHAT = (
+    "wrenches",
+    "torques",
+    "cops",
+    "gradient",
+    "com_gain",
+    "com_travel",
+    "unloading_travel",
+    "tipping_edge",
+)
 LENGTH = 0.03  # m: how far the CoM is drawn from the stance's, either way
 TILT = 0.12  # rad: likewise the base's roll, pitch and yaw
 TURN = 0.4  # rad: likewise every joint off the limbs
@@ -140,6 +149,7 @@ def reference_answer(stance, q, criterion):
         "com_gain": expected.com_gain,
         "com_travel": expected.com_travel,
         "tipping_edge": expected.tipping_edge,
+        "unloading_travel": expected.unloading_travel,
     }
 
 
@@ -291,6 +301,7 @@ def compare_within(name, start, count):
             "gradient": (found.gradient[i, j], expected.gradient),
             "com_gain": (found.com_gain[i, j], expected.com_gain),
             "com_travel": (found.com_travel[i, j], expected.com_travel),
+            "unloading_travel": (found.unloading_travel[i, j], expected.unloading_travel),
             "multipliers": (multipliers, equilibrium.row_multipliers),
             "one-sided": (sides[i, j], both),
         }

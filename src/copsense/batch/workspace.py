@@ -79,6 +79,7 @@ class Offsets(NamedTuple):
         margin: distance of each CoP to its sole's edge (nc,).
         travel: of the CoM before a contact tips (nc,).
         edge: the sole's edge it tips over (nc,).
+        unloading: travel of the CoM before a contact carries no load (nc,).
         size: rows in all.
     """
 
@@ -141,6 +142,7 @@ class Offsets(NamedTuple):
     margin: int
     travel: int
     edge: int
+    unloading: int
     size: int
 
 
@@ -216,6 +218,7 @@ def workspace_offsets(layout: RobotLayout, nq: int) -> Offsets:
         "margin": nc,
         "travel": nc,
         "edge": nc,
+        "unloading": nc,
     }
     starts, end = {}, 0
     for name, size in sizes.items():

@@ -101,6 +101,7 @@ def test_the_kernel_equals_the_reference_within_limits(answers, name, choose):
             "gradient": expected.gradient,
             "com_gain": expected.com_gain,
             "com_travel": expected.com_travel,
+            "unloading_travel": expected.unloading_travel,
             "load_share": equilibrium.wrenches[:, 2] / stance.robot.weight,
         }
         for what, value in pairs.items():

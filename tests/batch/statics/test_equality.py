@@ -55,6 +55,7 @@ def equals_the_reference(stance, choose, count):
                 "gradient": reference.gradient,
                 "com_gain": reference.com_gain,
                 "com_travel": reference.com_travel,
+                "unloading_travel": reference.unloading_travel,
                 "load_share": reference.equilibrium.wrenches[:, 2] / stance.robot.weight,
             }
             assert np.array_equal(found.tipping_edge[i, j], reference.tipping_edge)
@@ -69,7 +70,7 @@ def test_margins_are_the_edge_margins(case):
     for i, j, k in np.ndindex(found.margin.shape):
         edge = copsense.polygon.Polygon(stance.contacts[k].polygon).margin(found.cops[i, j, k])
         assert found.margin[i, j, k] == pytest.approx(edge.distance, abs=1e-13)
-    assert found.com_gain.size == found.com_travel.size == 0
+    assert found.com_gain.size == found.com_travel.size == found.unloading_travel.size == 0
 
 
 def test_every_kind_of_joint_is_served():

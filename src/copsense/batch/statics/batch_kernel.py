@@ -57,7 +57,7 @@ class BatchKernel:
         criteria: the criteria or policies, of distinct names.
         names: of the criteria.
         limits: what wrenches and torques must respect; None for nothing.
-        gains: whether CoM gain, CoM travel and tipping edge are computed too.
+        gains: whether CoM gain, tipping edge and CoM travels are computed too.
         fallback_reason: why the reference answers everything; empty where the kernel does its
             part.
         by_reference: criterion -> why the reference answers it where the kernel does its part.
@@ -90,7 +90,7 @@ class BatchKernel:
             stance: gives robot and contacts.
             criteria: criteria of distinct names, or policies q -> wrenches.
             limits: what wrenches and torques must respect; None for nothing. Policies take none.
-            gains: compute CoM gain, CoM travel and tipping edge too.
+            gains: compute CoM gain, tipping edge and CoM travels (to tipping, to unloading) too.
 
         Raises:
             InvalidInputError: no criterion, two of one name, weights or limits that do not fit.
@@ -389,7 +389,7 @@ def evaluate_batch(
         criteria: criteria of distinct names, or policies q -> wrenches.
         limits: what wrenches and torques must respect; None for nothing. The results are then those
             within the limits, and `BatchResult.limits` says which limits press.
-        gains: compute CoM gain, CoM travel and tipping edge too.
+        gains: compute CoM gain, tipping edge and CoM travels (to tipping, to unloading) too.
         out: results of the same shape to overwrite, so that nothing is allocated.
         threads: threads that share the postures; the results do not depend on it.
         device: ``"cpu"``, or ``"cuda"`` for a graphics processor of NVIDIA's, which evaluates what

@@ -35,6 +35,8 @@ class BatchResult:
             empty where not asked for.
         tipping_edge: index of the sole's edge that it goes to, as `CopSensitivity.tipping_edge`; -1
             where it goes to none, empty where not asked for.
+        unloading_travel: first-order distance of the CoM to where a contact carries no load, as
+            `CopSensitivity.unloading_travel` [m]; empty where not asked for.
         margin: signed distance of each CoP to its sole's nearest edge [m]; infinite without a sole.
         load_share: f_z / (m g) of each contact.
         com: centre of mass in the world [m].
@@ -51,6 +53,7 @@ class BatchResult:
     com_gain: Float[np.ndarray, "G nk nc 2 2"]
     com_travel: Float[np.ndarray, "G nk nc"]
     tipping_edge: Int[np.ndarray, "G nk nc"]
+    unloading_travel: Float[np.ndarray, "G nk nc"]
     margin: Float[np.ndarray, "N nk nc"]
     load_share: Float[np.ndarray, "N nk nc"]
     com: Float[np.ndarray, "N 3"]
@@ -79,7 +82,7 @@ class BatchResult:
         return sum(array.nbytes for array in arrays_of(self).values())
 
 
-GAINS = ("com_gain", "com_travel", "tipping_edge")
+GAINS = ("com_gain", "com_travel", "tipping_edge", "unloading_travel")
 """Arrays that a batch fills only where it is asked for them."""
 
 
@@ -114,6 +117,7 @@ def empty_result(
         "com_gain": (counted, nk, nc, 2, 2),
         "com_travel": (counted, nk, nc),
         "tipping_edge": (counted, nk, nc),
+        "unloading_travel": (counted, nk, nc),
         "margin": (count, nk, nc),
         "load_share": (count, nk, nc),
         "com": (count, 3),

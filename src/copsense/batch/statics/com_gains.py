@@ -139,11 +139,12 @@ def along_motions(offset: Offsets, W: Any, gradient: int, out: int, nv: int) -> 
 
 @compiled
 def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
-    """Distance to each sole's nearest edge; with `travel`, how far the CoM may move before it tips.
+    """Distance to each sole's nearest edge; with `travel`, how far the CoM may move.
 
-    The travel is the least s / |grad s| over the edges, with the slack s = w (b - a . p), w the
+    Until it tips, the least s / |grad s| over the edges, with the slack s = w (b - a . p), w the
     contact's share of the weight, and grad s = (b - a . p) grad w - w a' Gamma. An edge already
     passed whose slack stands still makes it minus infinity. As `CopSensitivity.com_travel`.
+    Until it carries no load, w / |grad w|, as `CopSensitivity.unloading_travel`.
     """
     for k in range(len(feet.body)):
         x, y = load(W, offset.cop + 2 * k), load(W, offset.cop + 2 * k + 1)
@@ -165,18 +166,21 @@ def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
                 nearest = where_less(distance, free, 1.0 * (e - feet.edge_first[k]), nearest)
                 free = where_less(distance, free, distance, free)
         store(W, offset.margin + k, least)
-        if travel and feet.edge_first[k] < feet.edge_first[k + 1]:
+        if not travel:
+            continue
+        u, v = load(W, offset.load_gain + 2 * k), load(W, offset.load_gain + 2 * k + 1)
+        fall = root(u * u + v * v)
+        if feet.edge_first[k] < feet.edge_first[k + 1]:
             # A CoP that limits hold at a vertex meets all edges at once, where the load is gone.
             moves = splat(0.0)
             for e in range(4):
                 entry = magnitude(load(W, offset.gain + 4 * k + e))
                 moves = where_less(moves, entry, entry, moves)
-            u, v = load(W, offset.load_gain + 2 * k), load(W, offset.load_gain + 2 * k + 1)
-            fall = root(u * u + v * v)
             empty = where_less(STILL, fall, w / fall, splat(np.inf))
             first = where_less(STILL, fall, splat(0.0), splat(-1.0))
             free = where_less(moves, HELD, empty, free)
             nearest = where_less(moves, HELD, first, nearest)
-        if travel:
-            store(W, offset.travel + k, free)
-            store(W, offset.edge + k, nearest)
+        store(W, offset.travel + k, free)
+        store(W, offset.edge + k, nearest)
+        still = where_less(w, 0.0, splat(-np.inf), splat(np.inf))
+        store(W, offset.unloading + k, where_less(STILL, fall, w / fall, still))

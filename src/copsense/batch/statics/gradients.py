@@ -28,12 +28,18 @@ from copsense.batch.statics.com_gains import along_motions
 from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
 from copsense.batch.statics.limit_offsets import LimitOffsets
 from copsense.batch.statics.load_sharing import across_symmetric, own_wrenches, weigh
-from copsense.batch.statics.loops import expand, gather_groups, times_lower, times_upper
+from copsense.batch.statics.loops import (
+    expand,
+    gather_groups,
+    pair_line,
+    times_lower,
+    times_upper,
+)
 from copsense.batch.statics.tangents import project, store_base
 from copsense.batch.vectors import across, add3, cross3, dot3, load3, scale3, store3, sub3
 from copsense.batch.workspace import Offsets
 
-LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight
+LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight, for gains
 
 
 @compiled
@@ -52,12 +58,11 @@ def wrench_gradients(
     for k in range(len(feet.body)):
         if feet.point[k]:
             _stand_still(offset, W, k, nv)
-            continue
         axes = offset.foot_rotation + 9 * k
         z = load3(W, axes + 6)
         lean = cross3(sub3(load3(W, offset.foot + 3 * k), load3(W, offset.middle)), z)
         share = 1.0 / load(W, offset.contact_wrench + 6 * k + 2)
-        for output in range(_outputs(feet, k, gains)):
+        for output in range(LOAD if feet.point[k] else 0, LOAD + 1 if gains else LOAD):
             if output == LOAD:
                 v = scale3(1.0 / feet.weight, lean)
             else:
@@ -74,12 +79,6 @@ def wrench_gradients(
                 store(W, at + i, a * load(W, offset.level + i) + b * load(W, offset.level + nv + i))
             if output == LOAD:
                 along_motions(offset, W, at, offset.load_gain + 2 * k, nv)
-
-
-@compiled
-def _outputs(feet: Feet, k: int, gains: bool) -> int:
-    """How many gradients a surface contact has: its share of the weight where it may tip."""
-    return 3 if gains and feet.edge_first[k] < feet.edge_first[k + 1] else 2
 
 
 @compiled
@@ -110,8 +109,7 @@ def torque_gradients(
     for k in range(len(feet.body)):
         if feet.point[k]:
             _stand_still(offset, W, k, nv)
-            continue
-        for output in range(_outputs(feet, k, gains)):
+        for output in range(LOAD if feet.point[k] else 0, LOAD + 1 if gains else LOAD):
             at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
             _adjoint(feet, offset, W, criteria, index, k, output, limits)
             _sweep(tree, feet, offset, W, at)
@@ -186,21 +184,26 @@ def _adjoint(
     mu = N z with the internal wrenches N of the unknowns: R' R z = -N' l. Where limits press, what
     they leave of it: R z = P R^-T (-N' l).
     """
-    ns, r, held = len(feet.support), feet.unknowns, feet.order[0]
+    ns, r = len(feet.support), feet.unknowns
     weighted = criteria.kind[index] != LEAST_TORQUE
-    v, w = _covector(feet, offset, W, k, output)
-    for j in range(r):
-        store(W, offset.unknown + j, splat(0.0))
-    for e in feet.order[1:]:
-        # The held contact feels the opposite of every other.
-        if e == k or held == k:
-            sign = -1.0 if e == k else 1.0
-            at, own = offset.unknown + feet.first[e], v
-            if feet.point[e]:
-                own = add3(v, cross3(w, load3(W, offset.foot + 3 * e)))
-            store3(W, at, scale3(sign, own))
-            if not feet.point[e]:
-                store3(W, at + 3, scale3(sign, w))
+    l = _covector(feet, offset, W, k, output)
+    v, w = _shared(feet, offset, W, k, l)
+    if feet.held == 3:
+        for pair in range(3):
+            a, b = feet.order[pair], feet.order[(pair + 1) % 3]
+            sign = (1.0 if k == b else 0.0) - (1.0 if k == a else 0.0)
+            store(W, offset.unknown + pair, sign * dot3(pair_line(offset, W, a, b), l[0]))
+    for e in feet.order[feet.held :]:
+        # The held contacts feel the opposite of every other.
+        own, turn = v, w
+        if e == k:
+            own, turn = sub3(own, l[0]), sub3(turn, l[1])
+        at = offset.unknown + feet.first[e]
+        if feet.point[e]:
+            own = add3(own, cross3(turn, load3(W, offset.foot + 3 * e)))
+        else:
+            store3(W, at + 3, turn)
+        store3(W, at, own)
     T = offset.Tw if weighted else offset.T
     times_lower(W, T, offset.unknown, r)
     if limits is not None:
@@ -208,27 +211,24 @@ def _adjoint(
     times_upper(W, T, offset.unknown, r)
     expand(feet, offset, W, offset.unknown, offset.nothing, offset.inner)
     gather_groups(feet, W, offset.inner, offset.inner_group)
-    if held != k:
-        v, w = scale3(0.0, v), scale3(0.0, w)
     if criteria.wrench_reach[index] >= 0:
         own_wrenches(feet, offset, W, offset.inner, offset.own)
-        more = _held_cost(offset, W, criteria, index, held)
-        v, w = add3(v, more[0]), add3(w, more[1])
+        for h in feet.order[: feet.held]:
+            more = _shared(feet, offset, W, h, _cost(offset, W, criteria, index, h))
+            w = add3(w, more[1])
     for t in range(ns):
         i, mu = feet.support[t], offset.inner_group + 6 * feet.group[t]
         s = offset.screw + 6 * i
         change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
         store(W, offset.felt + t, change)
     for t in range(ns):
-        s = offset.screw + 6 * feet.support[t]
         rate = -weigh(W, criteria.torque[index], criteria.torque_reach[index], t, offset.felt)
         if limits is not None:
             for j in range(r):
                 response = load(W, limits.torque_response + r * t + j)
                 rate = rate + response * load(W, limits.shift + j)
         store(W, offset.rate + t, rate)
-        if feet.member[feet.group[t], held]:
-            w = sub3(w, scale3(rate, load3(W, s + 3)))
+        w = sub3(w, scale3(rate, load3(W, offset.held_row + 6 * t + 3)))
     if limits is not None:
         for j in range(r):
             response = load3(W, limits.twist_response + 3 * j)
@@ -237,8 +237,28 @@ def _adjoint(
 
 
 @compiled
-def _held_cost(offset: Offsets, W: Any, criteria: KernelCriteria, index: int, held: int) -> Any:
-    """W_f of the wrenches `own` at the held contact, a covector on its wrench there.
+def _shared(feet: Feet, offset: Offsets, W: Any, k: int, l: Any) -> Any:
+    """A covector on a contact's wrench as one on what the held contacts take: zero if not held.
+
+    f_k = F / 3 + I^-1 (M - c x F) x rho_k of three points (see `loops`) gives, with the covector a
+    on f_k, Omega = I^-1 (rho_k x a) on M and a / 3 - Omega x c on F.
+    """
+    zero = splat(0.0)
+    v, w = (zero, zero, zero), (zero, zero, zero)
+    for h in feet.order[: feet.held]:
+        if h == k:
+            v, w = l
+            if feet.held == 3:
+                r, c = load3(W, offset.foot + 3 * k), load3(W, offset.spread)
+                a = add3(v, cross3(w, r))
+                w = across_symmetric(W, offset.spread + 3, cross3(sub3(r, c), a))
+                v = sub3(scale3(1.0 / 3.0, a), cross3(w, c))
+    return v, w
+
+
+@compiled
+def _cost(offset: Offsets, W: Any, criteria: KernelCriteria, index: int, held: int) -> Any:
+    """W_f of the wrenches `own` at a contact, a covector on its wrench there.
 
     Moved to the base's origin: (f + r x m, m).
     """

@@ -39,6 +39,7 @@ class Out(NamedTuple):
     com_gain: np.ndarray
     com_travel: np.ndarray
     tipping_edge: np.ndarray
+    unloading_travel: np.ndarray
     margin: np.ndarray
     load_share: np.ndarray
     com: np.ndarray
@@ -73,10 +74,10 @@ def evaluate_postures(
         place_feet(feet, offset, W)
         build(feet, offset, W)
         set_load(tree, offset, W)
-        if moving:
+        if moving or gains:
             span(feet, offset, W)
             level_gradients(tree, feet, offset, W)
-        if gains and moving:
+        if gains:
             factorise_inertia(tree, offset, W)
             com_motions(tree, feet, offset, W)
         for index in range(len(criteria.kind)):
@@ -106,6 +107,7 @@ def evaluate_postures(
             if gains:
                 write_postures(W, offset.gain, out.com_gain, first, count, column)
                 write_postures(W, offset.travel, out.com_travel, first, count, column)
+                write_postures(W, offset.unloading, out.unloading_travel, first, count, column)
             for lane in range(count):
                 row = first + lane
                 for k in range(nc):

@@ -142,3 +142,4 @@ def write_lane(
         for k in range(nc):
             out.com_travel[row, column, k] = get(W, offset.travel + k, lane)
             out.tipping_edge[row, column, k] = int(get(W, offset.edge + k, lane))
+            out.unloading_travel[row, column, k] = get(W, offset.unloading + k, lane)

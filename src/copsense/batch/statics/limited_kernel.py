@@ -133,7 +133,7 @@ def limit_postures(
         write_scales(feet, offset, limits, W)
         if moving:
             span(feet, offset, W)
-        if gains and moving:
+        if gains:
             factorise_inertia(tree, offset, W)
             com_motions(tree, feet, offset, W)
         for index in range(len(criteria.kind)):

@@ -19,7 +19,7 @@ from copsense.batch.statics.kernel_limits import KernelLimits
 from copsense.batch.statics.limit_offsets import LimitOffsets
 from copsense.batch.statics.load_sharing import own_wrenches
 from copsense.batch.statics.loops import expand, times_upper
-from copsense.batch.vectors import add3, cross3, dot3, load3
+from copsense.batch.vectors import add3, cross3, dot3, load3, scale3, sub3
 from copsense.batch.workspace import Offsets
 
 PRESSING = 1e-9  # multipliers, relative to the largest gradient, that do not press, as in `statics`
@@ -215,7 +215,6 @@ def write_responses(at: Within, lane: int, q: int) -> None:
     """Into a lane: x, what the pressing rows leave, and how their multipliers answer."""
     feet, offset, limits, rows, _criteria, W, p = at
     r, rc = feet.unknowns, len(rows.bound)
-    held = feet.order[0]
     for i in range(r):
         put(W, limits.shift + i, lane, p.x[i])
         for j in range(r):
@@ -235,21 +234,44 @@ def write_responses(at: Within, lane: int, q: int) -> None:
             for c in range(k + 1, q):
                 s -= p.R[k, c] * p.d[c]
             p.d[k] = s / p.R[k, k]
-        x, y, z = 0.0, 0.0, 0.0
         for k in range(q):
             row = p.held[k]
             if row >= rc:
                 t = (row - rc) // 2
                 sign = 1.0 if (row - rc) % 2 == 0 else -1.0
                 put(W, limits.torque_response + r * t + j, lane, sign * p.d[k])
-            elif rows.first[held] <= row < rows.first[held + 1]:
-                x += p.d[k] * rows.coefficient[3, row]
-                y += p.d[k] * rows.coefficient[4, row]
-                z += p.d[k] * rows.coefficient[5, row]
+        w = (0.0, 0.0, 0.0)
+        for h in feet.order[: feet.held]:
+            # A surface turns by the moments of its rows, three points by I^-1 rho x their forces.
+            part = 3 if feet.held == 1 else 0
+            a = (0.0, 0.0, 0.0)
+            for k in range(q):
+                row, share = p.held[k], rows.coefficient
+                if rows.first[h] <= row < rows.first[h + 1]:
+                    own = share[part, row], share[part + 1, row], share[part + 2, row]
+                    a = add3(a, scale3(p.d[k], own))
+            a = _across_lane(W, offset.foot_rotation + 9 * h, lane, a)
+            if feet.held == 3:
+                foot, middle = offset.foot + 3 * h, offset.spread
+                a = cross3(sub3(_get3(W, foot, lane), _get3(W, middle, lane)), a)
+            w = add3(w, a)
+        if feet.held == 3:
+            w = _across_lane(W, offset.spread + 3, lane, w)
         for e in range(3):
-            a = offset.foot_rotation + 9 * held + e
-            turned = get(W, a, lane) * x + get(W, a + 3, lane) * y + get(W, a + 6, lane) * z
-            put(W, limits.twist_response + 3 * j + e, lane, turned)
+            put(W, limits.twist_response + 3 * j + e, lane, w[e])
+
+
+@compiled
+def _get3(W: Any, row: int, lane: int) -> Any:
+    """A vector of one posture."""
+    return get(W, row, lane), get(W, row + 1, lane), get(W, row + 2, lane)
+
+
+@compiled
+def _across_lane(W: Any, row: int, lane: int, a: Any) -> Any:
+    """A a of one posture's A, three columns in nine rows."""
+    x, y, z = _get3(W, row, lane), _get3(W, row + 3, lane), _get3(W, row + 6, lane)
+    return add3(add3(scale3(a[0], x), scale3(a[1], y)), scale3(a[2], z))
 
 
 @compiled

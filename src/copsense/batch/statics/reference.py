@@ -54,6 +54,7 @@ def fill_row(
                 "com_gain": found.com_gain,
                 "com_travel": found.com_travel,
                 "tipping_edge": found.tipping_edge,
+                "unloading_travel": found.unloading_travel,
             }
     except CopsenseError as error:
         for name in per_criterion:
