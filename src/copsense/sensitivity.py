@@ -205,7 +205,15 @@ class CopSensitivity:
 
         Signed as the load, infinite where the load does not change.
         """
-        share = self.equilibrium.wrenches[:, 2] / self.equilibrium.stance.robot.weight
+        return self.load_travel(self.equilibrium.wrenches[:, 2])
+
+    def load_travel(self, loads: Float[np.ndarray, " nc"]) -> Float[np.ndarray, " nc"]:
+        """How far the CoM may move to first order before loads are used up (nc,) [m].
+
+        Args:
+            loads: of each contact [N]; with those of the equilibrium it is `unloading_travel`.
+        """
+        share = loads / self.equilibrium.stance.robot.weight
         speed = np.linalg.norm(self.load_gain, axis=1)
         still = speed <= STILL
         return np.where(still, np.copysign(np.inf, share), share / np.where(still, 1.0, speed))

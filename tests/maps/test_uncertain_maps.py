@@ -13,6 +13,7 @@ from copsense.uncertainty import (
     robust_com_travel,
     sources_of,
 )
+from copsense.uncertainty.perturbation import perturbed
 
 UNSURE = Uncertainty(links={"*": {"mass_percent": 5.0}}, ground={"roll_deg": 0.5})
 GRID = Grid((Axis("com_y", 0.0, 0.02, 2), Axis("com_x", 0.0, 0.01, 2)))
@@ -56,7 +57,7 @@ def test_without_errors_the_travel_is_left_and_with_small_ones_the_exact_is_near
     found = copsense.cop_sensitivity(icub, wrench)
     sources = sources_of(UNSURE, icub)
     for left in robust_com_travel(found, sources, 1e-12):
-        assert left == pytest.approx(found.com_travel)
+        assert left == pytest.approx(np.minimum(found.com_travel, found.unloading_travel))
     # Its slacks are affine in the CoM: what differs is how errors grow on the way.
     spread = propagate_uncertainty(icub, wrench, UNSURE, samples=0)
     likely, worst = robust_com_travel(found, sources, UNSURE.sigmas)
@@ -71,4 +72,27 @@ def test_the_command_maps_it_too(tmp_path):
         *("--uncertainty", "default", "--output", where),
     )
     assert said.code == 0, said.err
-    assert np.isposinf(copsense.load_map(where)["robust_com_travel"].values).all()  # no sole
+    assert "note: no sole is known under l_sole, r_sole, so when it tips" in said.err
+    assert "unloads)" in said.out
+    dataset = copsense.load_map(where)
+    least = dataset["least_com_travel"]
+    assert (dataset["robust_com_travel"] < dataset["likely_com_travel"]).all()
+    assert (dataset["likely_com_travel"] < least).all()
+    assert least.equals(dataset["unloading_travel"].min("contact").rename(least.name))
+
+
+def test_errors_take_of_a_points_load_what_the_whole_model_says(stance_of):
+    stance, wrench = stance_of("solo12"), copsense.minimum_wrench(1.0)
+    sources = sources_of(Uncertainty(ground={"roll_deg": 2.0}), stance)
+    found = copsense.cop_sensitivity(stance, wrench)
+    load, weight = found.equilibrium.wrenches[:, 2], stance.robot.weight
+    ends = [
+        copsense.solve_equilibrium(perturbed(stance, sources, np.array([e])), wrench)
+        for e in (-1e-4, 1e-4)
+    ]
+    rate = (ends[1].wrenches[:, 2] - ends[0].wrenches[:, 2]) / 2e-4
+    taken = 3.0 * sources[0].deviation * np.abs(rate)
+    left = (load - taken) / weight / np.linalg.norm(found.load_gain, axis=1)
+    for travel in robust_com_travel(found, sources, 3.0):  # of one source the two are the same
+        assert travel == pytest.approx(left, rel=1e-6)
+    assert (taken > 0.01 * load).all()

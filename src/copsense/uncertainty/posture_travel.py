@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -15,10 +15,11 @@ from copsense.uncertainty.source_changes import change_of
 def robust_com_travel(
     sensitivity: CopSensitivity, sources: Sequence[Source], sigmas: float
 ) -> tuple[Float[np.ndarray, " nc"], Float[np.ndarray, " nc"]]:
-    """What is left of `CopSensitivity.com_travel` of each contact, likely and at worst [m].
+    """How far errors let the CoM move before a contact tips or unloads, likely and at worst [m].
 
-    The slack of an edge less what the errors take of it, over how fast the CoM uses it up. For one
-    posture `propagate_uncertainty` has the exact travel; this is for many.
+    What they leave of the lesser of `CopSensitivity.com_travel` and `unloading_travel`: the slack
+    of an edge, or the load, less what the errors take of it, over how fast the CoM uses it up. For
+    one posture `propagate_uncertainty` has the exact travel; this is for many.
 
     Args:
         sensitivity: of a criterion's own wrenches at a posture.
@@ -27,13 +28,18 @@ def robust_com_travel(
 
     Returns:
         Along the worst direction of the ellipsoid of errors (nc,), and where every source is off
-        its worst way (nc,). Negative where the contact may tip as it stands.
+        its worst way (nc,). Negative where the contact may tip or unload as it stands.
     """
     equilibrium = sensitivity.equilibrium
     stance, rows = equilibrium.stance, equilibrium.stance.edge_rows
-    slack = rows.dot(equilibrium.wrenches.reshape(-1))
+    slack, loads = rows.dot(equilibrium.wrenches.reshape(-1)), equilibrium.wrenches[:, 2]
     forces, _ = equilibrium.response(change_of(stance, sources))
     deviations = sigmas * np.array([source.deviation for source in sources])
-    taken = rows.dot(stance.unstack(forces).reshape(-1, len(sources))) * deviations
-    likely = sensitivity.slack_travel(slack - np.linalg.norm(taken, axis=1))[0]
-    return likely, sensitivity.slack_travel(slack - np.abs(taken).sum(axis=1))[0]
+    changes = stance.unstack(forces) * deviations
+    taken, load = rows.dot(changes.reshape(-1, len(sources))), changes[:, 2]
+
+    def left(size: Callable[[np.ndarray], np.ndarray]) -> Float[np.ndarray, " nc"]:
+        tips, _ = sensitivity.slack_travel(slack - size(taken))
+        return np.minimum(tips, sensitivity.load_travel(loads - size(load)))
+
+    return left(lambda a: np.linalg.norm(a, axis=1)), left(lambda a: np.abs(a).sum(axis=1))
