@@ -219,6 +219,18 @@ def test_criteria_that_go_equally_far_are_said_to(icub):
     )
 
 
+def test_a_travel_that_is_none_is_words():
+    rows = {
+        name: {"contacts": {"foot": {"com_travel": tips, "unloading_travel": 0.3, "margin": 0.0}}}
+        for name, tips in {"a": 0.02, "b": -0.003, "c": 0.01}.items()
+    }
+    contacts = [{"name": "foot", "kind": "surface"}]
+    assert verdict({"criteria": rows, "contacts": contacts, "com_span": 1.0}) == (
+        "a keeps the feet planted longest: to first order the CoM may move 20.0 mm before foot "
+        "tips (b: foot tips already, c 10.0 mm)."
+    )
+
+
 @pytest.mark.parametrize(
     ("travels", "said"),
     [

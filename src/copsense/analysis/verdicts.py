@@ -102,5 +102,9 @@ def ranked(reach: dict[str, tuple[float, str]]) -> list[list[str]]:
 
 
 def _others(reach: dict[str, tuple[float, str]], *told: str) -> str:
-    others = ", ".join(f"{n} {reach[n][0] * 1e3:.1f} mm" for n in reach if n not in told)
+    others = ", ".join(
+        f"{n} {d * 1e3:.1f} mm" if d >= 0 else f"{n}: {event} already"
+        for n, (d, event) in reach.items()
+        if n not in told
+    )
     return f" ({others})" if others else ""
