@@ -32,7 +32,8 @@ for name, found in summary.criteria.items():
     worst = found.worst_travel[0]
     half = found.travel_percentiles[50.0] * 1e3
     print(f"{name}: half of the postures have {half:.1f} mm of travel or less,")
-    print(f"    the worst {worst.value * 1e3:.1f} mm: {worst.coordinates}, {worst.contact} tips")
+    what = f"{worst.contact} {worst.event}"
+    print(f"    the worst {worst.value * 1e3:.1f} mm: {worst.coordinates}, {what}")
 
 # %%
 # The load pulls to the left, so the robot does best with its own centre of mass to the right: by as

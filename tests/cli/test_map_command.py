@@ -1,6 +1,7 @@
 """``copsense map``: what it prints, writes and rejects."""
 
 import importlib.util
+import re
 import signal
 from unittest.mock import patch
 
@@ -51,7 +52,11 @@ def test_the_same_command_again_only_tells_and_draws(made):
     folder, _ = made
     before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
     answer = run(*COMMAND, "--output", folder / "m.zarr")
-    assert "CoM travel: worst" in answer.out
+    travel = load_map(folder / "m.zarr")["least_com_travel"].sel(criterion="minimum-wrench")
+    none, known = int((travel < 0).sum()), int(travel.notnull().sum())
+    assert 1 < none < known
+    assert f"CoM travel: none at {none} postures ({none / known:.1%}), worst at com_y" in answer.out
+    assert "_sole off its sole); median" in answer.out
     assert "deg" in answer.out
     assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
 
@@ -128,12 +133,20 @@ def test_lost_postures_are_reported_with_remedy_and_reason(tmp_path):
     assert "unreachable, first at com_x -0.0600 m, com_y -0.0600 m: contact" in answer.out
 
 
-def test_points_alone_have_no_travel_to_be_the_least(tmp_path):
+def test_of_points_the_travel_is_that_until_the_first_unloads(tmp_path, stance_of):
     ranges = ("--over", "com_x=-0.01:0.01:3", "--over", "com_y=-0.01:0.01:3")
     outputs = ("--output", tmp_path / "m.zarr", "--plot", tmp_path / "m.png")
     answer = run("map", "solo12", *ranges, "--criterion", "minimum-torque", *outputs)
     assert answer.code == 0, answer.err
-    assert "CoM travel: unlimited" in answer.out
+    words = re.search(
+        r"CoM travel: worst \+(.+) mm at com_x (.+) m, com_y (.+) m \((.+) unloads\); median \+.+",
+        answer.out,
+    )
+    distance, x, y = map(float, words.groups()[:3])
+    verdict = copsense.analyse(
+        stance_of("solo12"), [copsense.minimum_torque()], at={"com_x": x, "com_y": y}
+    ).verdict
+    assert f"may move {distance:.1f} mm before {words[4]} unloads." in verdict
     assert "inf" not in answer.out
 
 

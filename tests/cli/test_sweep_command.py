@@ -129,11 +129,11 @@ def test_the_com_is_swept_forwards_and_upwards_too(axis, tmp_path):
 @pytest.mark.parametrize(
     ("limits", "soleless", "failed", "said"),
     [
-        ("Limits()", (), 0, "a limit active at every posture"),
-        ("Limits()", (), 1, "a limit active at every posture that was evaluated"),
-        (None, (), 0, "a contact beyond its sole at every posture"),
-        (None, ("l_foot",), 0, "a contact that pulls at every posture"),
-        (None, (), 3, "no posture was evaluated"),
+        ("Limits()", "", 0, "a limit active at every posture"),
+        ("Limits()", "", 1, "a limit active at every posture that was evaluated"),
+        (None, "", 0, "a contact beyond its sole at every posture"),
+        (None, "l_foot", 0, "a contact that pulls at every posture"),
+        (None, "", 3, "no posture was evaluated"),
     ],
 )
 def test_what_is_so_at_no_posture_is_said_the_other_way_round(

@@ -41,7 +41,8 @@ def test_rows_are_those_of_the_reference(whole, icub, both, sample):
                 "cop": expected.cop,
                 "com_gain": expected.com_gain,
                 "com_travel": expected.com_travel,
-                "least_com_travel": expected.com_travel.min(),
+                "unloading_travel": expected.unloading_travel,
+                "least_com_travel": min(expected.com_travel.min(), expected.unloading_travel.min()),
                 "largest_com_gain": gains.max(),
                 "com": here.com,
             }.items():
@@ -56,7 +57,7 @@ def test_a_stored_number_is_the_computed_one_rounded(whole, icub, both, sample):
     there = np.flatnonzero(postures.converged)
     result = BatchKernel(icub, both).evaluate(postures.configurations[there])
     computed = {"cop": result.cops, "com": result.com, "load_share": result.load_share}
-    for name in ("com_gain", "com_travel", "margin"):
+    for name in ("com_gain", "com_travel", "unloading_travel", "margin"):
         computed[name] = getattr(result, name)
     for name, values in computed.items():
         stored = dataset[name].values[there]
@@ -252,7 +253,7 @@ def test_lost_for_its_height_a_map_has_a_note_on_the_height_to_map_over(icub, ma
     assert not height_advice(icub, make({"com_y": (5.0, 6.0)}))  # no height helps
 
 
-def test_the_summary_names_the_contact_and_the_edge_that_tip_first(whole):
+def test_the_summary_names_what_happens_first_to_which_contact(whole):
     dataset = copsense.load_map(whole[0])
     for name, criterion in whole[1].criteria.items():
         for worst in criterion.worst_travel:
@@ -260,7 +261,30 @@ def test_the_summary_names_the_contact_and_the_edge_that_tip_first(whole):
             k = list(here["contact"].values).index(worst.contact)
             assert here["com_travel"].values[k] == np.float32(worst.value)
             assert here["tipping_edge"].values[k] == worst.tipping_edge >= 0
-        assert {(w.contact, w.tipping_edge) for w in criterion.worst_gain} == {("", -1)}
+            assert worst.event == ("tips" if here["margin"].values[k] >= 0 else "off its sole")
+        others = {(w.contact, w.tipping_edge, w.event) for w in criterion.worst_gain}
+        assert others == {("", -1, "")}
+
+
+def test_points_unload_or_pull_already(stance_of, both, tmp_path):
+    stance, grid = (
+        stance_of("solo12"),
+        Grid((Axis("com_z", 0.17, 0.17, 1), Axis("com_y", 0.02, 0.16, 2))),
+    )
+    summary = copsense.map_postures(stance, grid, both, tmp_path / "m.zarr", configurations=True)
+    dataset = copsense.load_map(tmp_path / "m.zarr")
+    for j, criterion in enumerate(both):
+        row = summary.criteria[criterion.name]
+        for worst, event in zip(row.worst_travel, ("pulls", "unloads"), strict=True):
+            here = stance.at(dataset["configuration"].values[worst.posture])
+            expected = copsense.cop_sensitivity(here, criterion).unloading_travel
+            assert worst.event == event
+            assert worst.value == pytest.approx(expected.min(), rel=NEAR)
+            k = stance.contact_names.index(worst.contact)
+            assert expected[k] == pytest.approx(expected.min(), rel=1e-6)
+            assert worst.tipping_edge == -1
+        assert row.without_travel == 1
+        assert np.isposinf(dataset["com_travel"].values[:, j]).all()
 
 
 def test_the_summary_names_the_first_that_failed_and_why(whole):

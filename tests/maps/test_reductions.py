@@ -79,5 +79,6 @@ def test_the_summary_is_that_of_the_arrays(whole):
         first = row.worst_travel[0]
         assert first.value == travel[order[0]]
         assert first.coordinates["com_y"] == dataset["com_y"].values[order[0]]
+        assert row.without_travel == (travel[status == 0] < 0).sum()
         median = np.percentile(travel[status == 0], 50, method="inverted_cdf")
         assert row.travel_percentiles[50.0] == median, name

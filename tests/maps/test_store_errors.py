@@ -73,7 +73,7 @@ def test_what_is_not_a_map_is_rejected_and_kept(what, icub, both, sample, tmp_pa
     assert _snapshot(tmp_path) == before
 
 
-def test_a_store_that_a_future_version_made_says_so(whole, icub, both, sample, tmp_path):
+def test_a_store_of_another_format_says_so(whole, icub, both, sample, tmp_path):
     import shutil
 
     path = tmp_path / "m.zarr"
@@ -81,8 +81,13 @@ def test_a_store_that_a_future_version_made_says_so(whole, icub, both, sample, t
     group = zarr.open_group(path, mode="r+")
     parameters = json.loads(group.attrs["copsense_map"]) | {"format": 99}
     group.attrs["copsense_map"] = json.dumps(parameters)
-    with pytest.raises(OutputError, match="format is 99 there, 3 here"):
-        copsense.map_postures(icub, sample, both, path, chunk=32)
+    for use in (
+        lambda: copsense.map_postures(icub, sample, both, path, chunk=32),
+        lambda: copsense.load_map(path),
+        lambda: copsense.maps.map_summary(path),
+    ):
+        with pytest.raises(OutputError, match=r"of format 99.*format 4, which.*Give another path"):
+            use()
 
 
 def test_a_full_disk_is_one_error_and_the_map_goes_on_after_it(

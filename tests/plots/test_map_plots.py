@@ -74,7 +74,16 @@ def test_what_nothing_can_be_drawn_of_says_why():
         texts[value] = [text.get_text() for ax in figure.axes for text in ax.texts]
         assert (figure._supxlabel is not None) == np.isnan(value)
     assert texts[np.nan] == ["no posture was evaluated", "none"]
-    assert texts[np.inf] == ["without end: no contact can tip", "none"]
+    assert texts[np.inf] == ["without end:\nno contact tips or unloads", "none"]
+
+
+def test_below_zero_there_is_no_travel_and_the_picture_says_so():
+    for values, said in ((np.array([[-1e-3, 2e-3]]), True), (np.array([[1e-3, 2e-3]]), False)):
+        figure = plot_map([_marginal(values)])
+        below = figure._supxlabel is not None
+        assert below is said
+        assert not below or figure._supxlabel.get_text().startswith("Below zero a CoP is off its")
+        assert figure.axes[-1].get_ylabel() == "CoM travel until a contact\ntips or unloads [mm]"
 
 
 class _StopError(Exception):

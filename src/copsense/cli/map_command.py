@@ -12,7 +12,14 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.place_options import reject_varied
-from copsense.cli.printing import PICTURES, echo_json, echo_notes, progress_bar, waiting
+from copsense.cli.printing import (
+    PICTURES,
+    echo_json,
+    echo_notes,
+    progress_bar,
+    unknown_soles,
+    waiting,
+)
 from copsense.cli.stance_options import read_stance, stance_options
 from copsense.cli.uncertainty_option import read_uncertainty, uncertainty_option
 from copsense.cli.units import read_quantity
@@ -20,7 +27,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.extras import require
 
 if TYPE_CHECKING:
-    from copsense.maps import Axis, MapSummary
+    from copsense.maps import Axis, CriterionSummary, MapSummary
     from copsense.maps.sampling import Sampling
     from copsense.stance import Stance
 
@@ -124,6 +131,7 @@ def map_command(
 
     from copsense.batch import BatchKernel, PostureChart
     from copsense.files import check_output
+    from copsense.freedom import com_span
     from copsense.maps import MapPlan
     from copsense.maps.heights import height_advice
     from copsense.maps.map_statistics import summarise
@@ -147,6 +155,8 @@ def map_command(
     pair = _pair(plot_over, sampling.names)
     plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations, unsure)
     echo_notes(note for note in plan.notes if note not in stance.robot.notes)
+    if blind := [c.name for c in stance.contacts if c.kind != "point" and c.sole is None]:
+        echo_notes([unknown_soles(", ".join(blind))])
     kernel = BatchKernel(stance, plan.criteria, plan.limits)
     with waiting("compiling"):
         PostureChart(stance, sampling.names).compile()
@@ -191,7 +201,7 @@ def map_command(
     if as_json:
         echo_json(summary.to_dict() | {"plot": plot, "notes": list(plan.notes)})
     else:
-        _print(summary, plot)
+        _print(summary, plot, com_span(stance))
     click.get_current_context().exit(1 if _failures(summary) else 0)
 
 
@@ -259,9 +269,10 @@ def _draw(
 
     dataset = load_map(summary.path)
     robust = ["robust_com_travel"] * ("robust_com_travel" in dataset)
+    gain = ["largest_com_gain"] * any(c.kind != "point" for c in stance.contacts)
     marginals = [
         marginal(dataset, names, quantity, how)
-        for quantity in ("least_com_travel", *robust, "largest_com_gain")
+        for quantity in ("least_com_travel", *robust, *gain)  # CoPs of points stand still
     ]
     worst = {
         name: [
@@ -280,7 +291,7 @@ def _failures(summary: MapSummary) -> int:
     return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
 
 
-def _print(summary: MapSummary, plot: str | None) -> None:
+def _print(summary: MapSummary, plot: str | None, span: float) -> None:
     over = ", ".join(summary.coordinates)
     click.echo(f"{summary.robot}: {summary.postures} postures over {over}")
     units = dict(zip(summary.coordinates, summary.units, strict=True))
@@ -295,17 +306,8 @@ def _print(summary: MapSummary, plot: str | None) -> None:
                 reason = first.reason.removeprefix(f"{status}: ")
                 click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
             printed.add((status, first.posture))
-        if row.worst_travel and math.isinf(row.worst_travel[0].value):
-            click.echo("    CoM travel: unlimited, no contact can tip")
-        elif row.worst_travel:
-            worst = row.worst_travel[0]
-            middle = row.travel_percentiles[50.0]
-            click.echo(
-                f"    CoM travel: worst {worst.value * 1e3:+.1f} mm at "
-                f"{_place(worst.coordinates, units)}"
-                + (f" (edge {worst.tipping_edge} of {worst.contact})" if worst.contact else "")
-                + f"; median {middle * 1e3:+.1f} mm"
-            )
+        if row.worst_travel:
+            click.echo(f"    CoM travel: {_travel(row, units, span)}")
         if row.worst_gain:
             gain = row.worst_gain[0]
             click.echo(
@@ -313,6 +315,31 @@ def _print(summary: MapSummary, plot: str | None) -> None:
                 f"median {row.gain_percentiles[50.0]:.2f}"
             )
     click.echo(f"written: {summary.path}" + (f", {plot}" if plot else ""))
+
+
+def _travel(row: CriterionSummary, units: dict[str, str], span: float) -> str:
+    """The worst travel and what ends it, and the median; the CoM goes nowhere beyond its span."""
+    worst, half = row.worst_travel[0], _length(row.travel_percentiles[50.0], span)
+    if not worst.contact or worst.value > span:
+        return "no contact tips or unloads, to first order, wherever the CoM can go"
+    what = {
+        "tips": f"{worst.contact} tips over edge {worst.tipping_edge}",
+        "off its sole": f"CoP of {worst.contact} off its sole",
+    }.get(worst.event, f"{worst.contact} {worst.event}")
+    where = f"{_place(worst.coordinates, units)} ({what})"
+    if worst.value >= 0:
+        return f"worst {worst.value * 1e3:+.1f} mm at {where}; median {half}"
+    count = row.without_travel
+    return (
+        f"none at {count} posture{'s' * (count != 1)} ({count / row.counts['evaluated']:.1%}), "
+        f"worst at {where}; median {half}"
+    )
+
+
+def _length(travel: float, span: float) -> str:
+    if travel > span or travel == math.inf:
+        return "unlimited"
+    return f"{travel * 1e3:+.1f} mm" if travel >= 0 else "none"
 
 
 def _place(coordinates: Any, units: dict[str, str]) -> str:

@@ -13,7 +13,13 @@ from copsense.cli.criterion_options import criterion_options, read_criteria
 from copsense.cli.limit_options import read_limits
 from copsense.cli.option_lists import SectionedCommand
 from copsense.cli.place_options import Course, read_course
-from copsense.cli.printing import echo_json, echo_notes, echo_written, progress_bar
+from copsense.cli.printing import (
+    echo_json,
+    echo_notes,
+    echo_written,
+    progress_bar,
+    unknown_soles,
+)
 from copsense.cli.stance_options import read_stance, swept_stance_options
 from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
@@ -175,8 +181,4 @@ def _print(summary: dict[str, Any]) -> None:
                 f"{known[least]:.3f} Hz (least: {least})"
             )
     if summary["without_sole"]:
-        click.echo(
-            f"note: no sole is known under {summary['without_sole']}, so when it tips is not "
-            "either: give --sole X0:X1:Y0:Y1.",
-            err=True,
-        )
+        echo_notes([unknown_soles(summary["without_sole"])])

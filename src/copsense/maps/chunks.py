@@ -100,9 +100,10 @@ class ChunkEvaluator:
         for (i, j), why in result.reasons.items():
             status[rows[i], j], reason[rows[i], j] = REJECTED, why
         answers: Chunk = {
-            "least_com_travel": result.com_travel.min(axis=-1),
+            "least_com_travel": np.minimum(result.com_travel, result.unloading_travel).min(axis=-1),
             "largest_com_gain": _largest_singular_value(result.com_gain).max(axis=-1),
             "com_travel": result.com_travel,
+            "unloading_travel": result.unloading_travel,
             "tipping_edge": result.tipping_edge,
             "com_gain": result.com_gain,
             "cop": result.cops,

@@ -46,8 +46,8 @@ _COLUMNS = {
         _EACH,
         "float32",
         "m",
-        "first-order distance the centre of mass may move before the first "
-        "contact tips; negative where a centre of pressure is off its sole",
+        "first-order distance the centre of mass may move before the first contact tips or "
+        "unloads; negative where a centre of pressure is off its sole or a contact pulls",
     ),
     "largest_com_gain": Column(
         _EACH,
@@ -59,7 +59,13 @@ _COLUMNS = {
         (*_EACH, "contact"),
         "float32",
         "m",
-        "the same distance for each contact",
+        "first-order distance the centre of mass may move before the contact tips",
+    ),
+    "unloading_travel": Column(
+        (*_EACH, "contact"),
+        "float32",
+        "m",
+        "first-order distance the centre of mass may move before the contact carries no load",
     ),
     "tipping_edge": Column(
         (*_EACH, "contact"),

@@ -25,8 +25,10 @@ class WorstPosture(ShortRepr):
         posture: its number.
         coordinates: where it is, by name [m, rad].
         value: of the quantity there [m, or 1 for a gain].
-        contact: the contact that tips first there; empty for a gain, and where none can tip.
-        tipping_edge: index of its sole's edge that it tips over; -1 likewise.
+        contact: the contact that tips or unloads first there; empty for a gain, and where none can.
+        tipping_edge: index of its sole's edge that it tips over; -1 where it tips over none.
+        event: what it does: "tips" or "unloads"; already where the value is negative: "off its
+            sole" is the centre of pressure then, or it "pulls". Empty where `contact` is.
     """
 
     posture: int
@@ -34,6 +36,7 @@ class WorstPosture(ShortRepr):
     value: float
     contact: str = ""
     tipping_edge: int = -1
+    event: str = ""
 
     def __post_init__(self) -> None:
         """Own the coordinates."""
@@ -71,6 +74,8 @@ class CriterionSummary(ShortRepr):
             postures does not exceed.
         gain_percentiles: the same of the largest CoM gain.
         failed: status -> the first posture of it, with its reason.
+        without_travel: evaluated postures where a centre of pressure is off its sole already, or a
+            contact pulls: their travel is negative.
     """
 
     counts: Mapping[str, int]
@@ -79,6 +84,7 @@ class CriterionSummary(ShortRepr):
     travel_percentiles: Mapping[float, float]
     gain_percentiles: Mapping[float, float]
     failed: Mapping[str, FailedPosture]
+    without_travel: int = 0
 
     def __post_init__(self) -> None:
         """Own the mappings."""
@@ -134,6 +140,7 @@ class MapSummary(ShortRepr):
                     "worst_gain": [asdict(w) for w in row.worst_gain],
                     "travel_percentiles": row.travel_percentiles,
                     "gain_percentiles": row.gain_percentiles,
+                    "without_travel": row.without_travel,
                     "failed": {status: asdict(first) for status, first in row.failed.items()},
                 }
                 for name, row in self.criteria.items()
@@ -153,6 +160,12 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
     total: Part | None = None
     first: dict[tuple[int, int], int] = {}  # chunk with the first posture of a status
     shares = Percentiles(len(QUANTITIES) * len(store.criteria), LEVELS)
+    without = np.zeros(len(store.criteria), dtype=np.int64)
+
+    def count(block: np.ndarray) -> None:
+        shares.count(block)
+        without[:] += (block[:, : len(without)] < 0).sum(axis=0)  # the first quantity is the travel
+
     runs = list(store.runs())
     for start, end in runs:
         parts = store.parts(start, end)
@@ -160,7 +173,7 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
             for j, code in np.argwhere(part.counts > 0):
                 first.setdefault((int(j), int(code)), i)
         total = fold(parts if total is None else [total, *parts])
-        report(_rows(store, start, end, shares.count))
+        report(_rows(store, start, end, count))
     for start, end in runs:
         report(_rows(store, start, end, shares.refine))
     levels = shares.found().reshape(len(QUANTITIES), len(store.criteria), len(LEVELS))
@@ -187,6 +200,7 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
                 for (column, code), chunk in sorted(first.items())
                 if column == j and code != EVALUATED
             },
+            int(without[j]),
         )
     return MapSummary(
         str(store.path),
@@ -212,11 +226,19 @@ def _posture(
 ) -> WorstPosture:
     if quantity != "least_com_travel":
         return WorstPosture(row, _place(store, row), value)
-    travel = store.read("com_travel", row, row + 1)[0, criterion]
-    contact = int(np.argmin(travel))
-    edge = int(store.read("tipping_edge", row, row + 1)[0, criterion, contact])
-    name = store.contacts[contact] if edge >= 0 else ""
-    return WorstPosture(row, _place(store, row), value, name, edge)
+    tips, unloads, edges, load = (
+        store.read(name, row, row + 1)[0, criterion]
+        for name in ("com_travel", "unloading_travel", "tipping_edge", "load_share")
+    )
+    place, k = _place(store, row), int(np.argmin(np.minimum(tips, unloads)))
+    if np.isposinf(value):
+        return WorstPosture(row, place, value)
+    contact, edge = store.contacts[k], int(edges[k])
+    if load[k] < 0:
+        return WorstPosture(row, place, value, contact, event="pulls")
+    if unloads[k] < tips[k]:
+        return WorstPosture(row, place, value, contact, event="unloads")
+    return WorstPosture(row, place, value, contact, edge, "off its sole" if value < 0 else "tips")
 
 
 def _failed(store: MapStore, chunk: int, criterion: int, code: int) -> FailedPosture:

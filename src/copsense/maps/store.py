@@ -38,7 +38,7 @@ from copsense.maps.columns import (
     fill_value,
     labels,
 )
-from copsense.maps.map_plan import MapPlan
+from copsense.maps.map_plan import FORMAT, MapPlan
 from copsense.maps.reduction import QUANTITIES, WORST, Part
 from copsense.provenance import differences, digest, worded
 
@@ -206,11 +206,18 @@ def open_map(path: str | Path) -> MapStore:
         group = zarr.open_group(path, mode="r+", zarr_format=3)
         if _PARAMETERS not in group.attrs:
             raise OutputError(f"{not_a_map}: it has no parameters. {remedy}")
-        return MapStore(path, group)
+        store = MapStore(path, group)
     except (OSError, ValueError, KeyError, TypeError) as error:
         if isinstance(error, CopsenseError):
             raise
         raise OutputError(f"{not_a_map} that can be read: {error}. {remedy}") from None
+    if (made := store.parameters.get("format")) != FORMAT:
+        raise OutputError(
+            f"{str(path)[:300]} is a map of format {made}, whose columns mean other things than "
+            f"those of format {FORMAT}, which this version of copsense reads and resumes. It was "
+            "not touched. Give another path to make the map again; xarray.open_zarr opens this one."
+        )
+    return store
 
 
 def create_map(path: Path, plan: MapPlan) -> MapStore:

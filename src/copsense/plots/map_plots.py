@@ -32,15 +32,17 @@ from copsense.plots.style import (
 if TYPE_CHECKING:
     from copsense.maps.marginals import Marginal
 
-# quantity -> (words, unit shown, factor)
+_TRAVEL = "CoM travel until a contact\ntips or unloads [mm]"
+# quantity -> (words of the title, of the colours, factor)
 _SHOWN = {
-    "least_com_travel": ("CoM travel", "mm", MM),
-    "likely_com_travel": ("CoM travel likely left", "mm", MM),
-    "robust_com_travel": ("CoM travel left at worst", "mm", MM),
-    "largest_com_gain": ("CoM gain", "m/m", 1.0),
+    "least_com_travel": ("CoM travel", _TRAVEL, MM),
+    "likely_com_travel": ("CoM travel likely left", _TRAVEL, MM),
+    "robust_com_travel": ("CoM travel left at worst", _TRAVEL, MM),
+    "largest_com_gain": ("CoM gain", "CoM gain [m/m]", 1.0),
 }
 _NONE = "no posture was evaluated"
-_UNLIMITED = "without end: no contact can tip"
+_PASSED = "a CoP is off its sole, or a contact pulls"
+_UNLIMITED = "without end:\nno contact tips or unloads"
 _COLOURS, _CHANGE = "viridis", "RdBu"
 _LEVELS = 7  # contour lines
 _SHADES = (1.0, 0.55, 0.3)  # of the worst posture, the next and the one after
@@ -100,15 +102,20 @@ def plot_map(
         _draw_postures(ax, words[name], list((worst or {}).get(name, ())))
     if worst and columns > len(criteria):
         grid[-1, -1].set_axis_off()
-    if axes is None and any(np.isnan(here.values).any() for here in marginals):
-        figure.supxlabel(f"Pale: {_NONE} there.", fontsize=9, color=MUTED)
+    notes = {
+        f"Pale: {_NONE} there.": any(np.isnan(here.values).any() for here in marginals),
+        f"Below zero {_PASSED}.": any((here.values < 0).any() for here in marginals),
+    }
+    if axes is None and any(notes.values()):
+        said = " ".join(note for note, holds in notes.items() if holds)
+        figure.supxlabel(said, fontsize=9, color=MUTED)
     return figure
 
 
 def _draw_row(
     figure: Figure, axes: np.ndarray, here: Marginal, names: Mapping[str, str], colours: str
 ) -> None:
-    words, unit, factor = _SHOWN[here.quantity]
+    words, scale, factor = _SHOWN[here.quantity]
     values = here.values * factor
     shown = np.where(np.isfinite(values), values, np.nan)
     low, high = _range(shown)
@@ -119,13 +126,14 @@ def _draw_row(
         mesh = _heat(ax, here, cells, cmap=colours, vmin=low, vmax=high)
         ax.set_title(f"{names[name]}\n{here.how} {words}", fontsize=9)
     bar = figure.colorbar(mesh, ax=list(axes[: len(shown)]), aspect=30)
-    bar.set_label(f"{words} [{unit}]")
+    bar.set_label(scale)
     if len(shown) > 1:
         ax, change = axes[-1], shown[1] - shown[0]
         reach = max(abs(v) for v in _range(change)) or 1.0
         mesh = _heat(ax, here, change, cmap=_CHANGE, vmin=-reach, vmax=reach)
         ax.set_title(f"{names[here.criteria[1]]}\nless {here.criteria[0]}", fontsize=9)
-        figure.colorbar(mesh, ax=ax, aspect=30).set_label(f"difference [{unit}]")
+        unit = scale[scale.index("[") :]
+        figure.colorbar(mesh, ax=ax, aspect=30).set_label(f"difference {unit}")
 
 
 def _heat(ax: Axes, here: Marginal, cells: np.ndarray, **colour: Any) -> Any:
