@@ -119,7 +119,9 @@ def solve_posture(
     selector = np.eye(robot.model.nv)[columns]
     axes = [i for i, _ in wanted]
 
-    here, multipliers = stance, None
+    # `folded` once rows were left out as said twice, `whole` once none may be any more. Where they
+    # are held to second order they stay out: the fold equations stand for them.
+    here, multipliers, folded, whole = stance, None, False, False
     for iteration in range(_MAX_ITERATIONS):
         # h(q) = 0: contacts, centre of mass, joints; C = dh/dq.
         h = np.concatenate(
@@ -132,7 +134,10 @@ def solve_posture(
         )
         swing = here.hanging_derivative / robot.weight
         C = np.vstack([here.constraints, swing, here.com_jacobian[axes], selector])
-        A, errors, spread = independent_rows(here, C, h)
+        A, errors, spread = (C, h, None) if whole else independent_rows(here, C, h)
+        if spread is not None and not folded:
+            folded = not stance.false_motions.shape[1]
+        whole = folded and spread is None
         gradient, hessian = cost_derivatives(here, home, weights)
         if multipliers is None or spread is not None or len(multipliers) != len(A):
             multipliers = np.linalg.lstsq(A.T, -gradient, rcond=1e-10)[0]
@@ -156,6 +161,11 @@ def solve_posture(
             tangents, followed = followed_tangents(here, K, C, rate, spread)
             tangents[:, ~followed] = 0.0
             return Posture(stance.at(here.q), tangents, iteration)
+        stuck = folded and not whole and np.abs(errors).max() < TOLERANCE / 5
+        if stuck and np.abs(stationarity).max() < _STATIONARITY:
+            # What was left out as said twice is not in place: it says something of its own.
+            whole, multipliers = True, None
+            continue
         step = solve_bordered(K, -np.concatenate([stationarity, errors]))
         length = min(1.0, _LONGEST_STEP / max(float(np.abs(step[: robot.model.nv]).max()), 1e-300))
         before = here

@@ -59,6 +59,21 @@ def test_contacts_that_nearly_repeat_each_other_are_doubted():
     assert note.endswith("none about z (yaw).")
 
 
+@pytest.mark.parametrize("coordinate", ["com_x", "com_y"])
+def test_postures_near_those_where_contacts_repeat_each_other_are_found(coordinate):
+    """Without hip yaw, a row that is said twice upright says something of its own beside it."""
+    aside = stand(FULL[1:], 0.1, trunk=(0.0, 0.01, 0.2))
+    path = copsense.path.com_sweep(aside, coordinate, -0.016, 0.016, 9)
+    assert not path.failures
+    axis = "xyz".index(coordinate[-1])
+    for (stance, tangent), value in zip(path, path.values, strict=True):
+        assert stance.com[axis] == pytest.approx(value, abs=1e-12)
+        for here, start in zip(stance.placements, aside.placements, strict=True):
+            assert here.homogeneous == pytest.approx(start.homogeneous, abs=2e-12)
+        assert stance.constraints @ tangent == pytest.approx(np.zeros(12), abs=1e-6)
+        assert (stance.com_jacobian @ tangent)[axis] == pytest.approx(1.0, abs=1e-6)
+
+
 def test_what_legs_without_ankle_roll_leave_are_the_planar_motions_of_the_trunk(five):
     assert five.rank == 11
     assert held_com_axes(five) == (1,)

@@ -28,6 +28,8 @@ from copsense.stance import Stance, check_stance
 _SPACING = 2e-3  # m between the postures of a lateral reference
 _COARSE = 10  # times as far apart are those that find out whether it can be reached
 _SLACK = 1e-9
+# Singular values of what contacts hold twice: by rounding, and how many times that is the same.
+_TWICE, _AS_NEAR = 1e-10, 10.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -315,11 +317,19 @@ def _path_to_hold(stance: Stance) -> PosturePath:
     for name in names:
         at, still = own[name], {n: own[n] for n in names if n not in (name, "com_z")}
         path = com_sweep(stance, name, at - _SPACING, at + _SPACING, 3, held=still).shifted(-at)
-        # Where rank is gained, contacts share the load at once otherwise.
-        if not path.failures and all(there.rank == stance.rank for there in path.stances):
+        if not path.failures and all(_repeats_alike(stance, there) for there in path.stances):
             return path
         paths.append(path)
     return paths[0]
+
+
+def _repeats_alike(stance: Stance, there: Stance) -> bool:
+    """Whether the contacts hold as much twice at another posture; else loads jump on the way."""
+    here, moved = (
+        float(np.linalg.svd(s.constraints, compute_uv=False)[stance.rank :].max(initial=0.0))
+        for s in (stance, there)
+    )
+    return there.rank == stance.rank and moved <= _AS_NEAR * here + _TWICE
 
 
 def _check_signal(signal: object) -> None:
