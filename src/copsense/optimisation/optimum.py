@@ -271,8 +271,9 @@ class Front(ShortRepr):
         """A table with a row per posture."""
         first, second = (QUANTITIES[name] for name in self.objectives)
         robot = self.before.stance.robot.name
+        order = ", travels to first order" if {*self.objectives} & {*TRAVELS} else ""
         lines = [
-            f"{robot}: {first.name} against {second.name}",
+            f"{robot}: {first.name} against {second.name}{order}",
             f"{first.name:>12}  {second.name:>12}  exact travel [mm]  KKT residual",
         ]
         for point in self.points:
