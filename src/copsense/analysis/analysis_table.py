@@ -22,7 +22,7 @@ _COLUMNS = (
     "CoP x, y [mm]",
     "margin [mm]",
     "dCoP_y/dCoM_y",
-    "worst gain",
+    "energy gain",
     "CoM travel [mm]: tips",
     "over edge",
     "unloads",
