@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import html
 import logging as standard_logging
 import re
 from importlib.metadata import version as installed_version
@@ -195,6 +196,31 @@ def write_tables(app: Sphinx, page: str, source: list[str]) -> None:
             logger.warning("docs/errata.md has %d places for its %s, not one", count, name)
 
 
+OUTPUT = re.compile(
+    r'(<div class="highlight-(?:console|text)[^"]*)("><div class="highlight"><pre>)(.*?)(</pre>)',
+    flags=re.DOTALL,
+)
+COLUMNS = re.compile(r"\S {2,}\S")
+ON_A_PHONE = 46  # columns of output beside its margins
+
+
+def wrap_sentences(app: Sphinx, page: str, template: str, context: dict, doctree: object) -> None:
+    """Mark the long lines of outputs that have no columns, and outputs whose columns are wide."""
+
+    def marked(block: re.Match) -> str:
+        lines, wide = [], False
+        for line in block[3].split("\n"):
+            text = html.unescape(re.sub(r"<[^>]*>", "", line)).strip()
+            long = len(text) > ON_A_PHONE
+            table = bool(COLUMNS.search(text))
+            wide |= long and table
+            lines.append(f'<span class="sentence">{line}</span>' if long and not table else line)
+        return block[1] + " wide-output" * wide + block[2] + "\n".join(lines) + block[4]
+
+    if "body" in context:
+        context["body"] = OUTPUT.sub(marked, context["body"])
+
+
 def write_scenes(app: Sphinx, error: Exception | None) -> None:
     """Make the pages in 3-D by the code that scenes.md shows; megabytes that nobody commits."""
     if error is not None or app.builder.format != "html":
@@ -213,6 +239,7 @@ def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings, and make pages in 3-D."""
     app.connect("build-finished", write_scenes)
     app.connect("source-read", write_tables)
+    app.connect("html-page-context", wrap_sentences)
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.connect("autodoc-process-signature", name_aliases)
     app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))
