@@ -6,8 +6,10 @@ import re
 def test_long_sentences_of_outputs_wrap_and_their_columns_do_not(built):
     page = (built / "tutorials" / "which_controller.html").read_text("utf-8")
     notes = re.findall(r"^(.*)>note: contacts", page, flags=re.MULTILINE)
-    assert notes and all('class="sentence"' in before for before in notes)
+    assert notes
+    assert all('class="sentence"' in before for before in notes)
     rows = re.findall(r"^(.*)>  l_sole +0", page, flags=re.MULTILINE)
-    assert rows and not any("sentence" in before for before in rows)
+    assert rows
+    assert not any("sentence" in before for before in rows)
     assert "wide-output" in page
     assert "wide-output" not in (built / "install.html").read_text("utf-8")
