@@ -71,6 +71,15 @@ def test_a_mesh_near_its_file_is_found_without_options(package, filename, monkey
     assert found.polygon.max(axis=0) == pytest.approx(HIGH[:2])
 
 
+def test_a_mesh_is_relative_to_the_package_that_holds_the_file(package, monkeypatch):
+    monkeypatch.chdir("/")
+    path = put(package, "meshes/foot.stl")
+    with pytest.raises(ModelLoadError, match="relative"):
+        sole(path)
+    (package / "package.xml").write_text("<package/>", encoding="utf-8")
+    assert sole(path).offset[2] == pytest.approx(-0.03)
+
+
 @pytest.mark.parametrize("folder", [".", ".."])
 def test_the_package_and_the_folder_that_holds_it_are_both_package_folders(package, folder):
     text = urdf(MESH.replace("nowhere", "tiny_robot/meshes"))

@@ -13,7 +13,8 @@ from copsense.errors import ModelLoadError
 def find_mesh(filename: str, package_dirs: Iterable[str] = (), path: Path | None = None) -> Path:
     """The file of a mesh.
 
-    A relative name is looked up beside the URDF, then in the package folders. ``package://`` is
+    A relative name is looked up beside the URDF, in the ROS package that the URDF is part of (the
+    folder above it with a ``package.xml``), then in the package folders. ``package://`` is
     looked up in the package folders, in the folders above the URDF, and where ROS_PACKAGE_PATH and
     AMENT_PREFIX_PATH say; a folder may hold the package or be the package.
 
@@ -67,7 +68,8 @@ def _places(filename: str, package_dirs: tuple[str, ...], path: Path | None) -> 
     elif Path(filename).is_absolute():
         yield Path(filename)
     else:
-        for folder in above[:1] + folders:
+        root = [folder for folder in above if _is_file(folder / "package.xml")][:1]
+        for folder in above[:1] + root + folders:
             yield folder / filename
 
 

@@ -144,6 +144,31 @@ def test_knees_tell_which_way_a_robot_on_points_faces(tmp_path):
     assert "--base-yaw=270" in str(found.line)
 
 
+def test_names_of_feet_tell_ahead_from_behind_where_geometry_does_not(tmp_path):
+    other = {"fl": "hr", "fr": "hl", "hl": "fr", "hr": "fl"}
+    text = walker(legs=FOUR).replace('<box size="0.2 0.08 0.02"/>', '<sphere radius="0.02"/>')
+    turned = re.sub("(?<![a-z])(fl|fr|hl|hr)_", lambda m: other[m[1]] + "_", text)
+    found = inspect_robot(written(tmp_path, turned))
+    assert {foot.frame for foot in found.feet} == {f"{name}_foot" for name in other}
+    assert found.heading == 180.0
+    assert found.heading_reason.endswith("names tell ahead from behind")
+    # Of words that contradict each other, none counts.
+    mirrored = {"fl": "hl", "fr": "hr", "hl": "fl", "hr": "fr"}
+    text = re.sub("(?<![a-z])(fl|fr|hl|hr)_", lambda m: mirrored[m[1]] + "_", text)
+    found = inspect_robot(written(tmp_path, text))
+    assert found.heading == 0.0
+    assert found.heading_reason.endswith("nothing distinguishes ahead from behind")
+
+
+def test_many_short_legs_of_which_no_shape_is_known_get_no_line(tmp_path):
+    """Not a sole under each knee."""
+    found = inspect_robot(written(tmp_path, walker(FULL[1:4], legs=FOUR, box=False)))
+    assert len(found.feet) == 4
+    assert found.line is None
+    assert "--contact-offset" in found.reason
+    assert str(found).count(found.feet[0].reason) == 1
+
+
 def test_a_toe_tip_under_a_foot_is_doubted_aloud(tmp_path):
     # A foot of 200 x 80 mm, and a block of 13 x 45 mm that reaches 5 mm lower.
     tip = (

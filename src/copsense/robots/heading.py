@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,13 @@ _AHEAD = 0.05  # of its length: a sole set off less from its ankle does not say 
 _STRAIGHT = np.radians(15.0)  # knees bent less are straight
 _SPANNED = 0.3  # of axes that turn a thigh any way: the least singular value
 _NEWTON = 8  # steps
+_ALIKE = 0.5  # cosine to a line up to which names do not tell its ends apart
+_TIE = "nothing distinguishes ahead from behind"
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")  # of names such as toeFL, LF_FOOT, shank_hl
+_FRONT = frozenset({"front", "fore", "f", "fl", "fr", "lf", "rf"})
+_HIND = frozenset({"hind", "rear", "back", "h", "hl", "hr", "lh", "rh", "rl", "rr", "bl", "br"})
+_LEFT = frozenset({"left", "l", "fl", "lf", "hl", "lh", "rl", "bl"})
+_RIGHT = frozenset({"right", "r", "fr", "rf", "hr", "rh", "rr", "br"})
 _TURNS = {  # axis of the base that is up -> roll, pitch, yaw [deg] that turn it there
     (0, 1): (0.0, -90.0, 0.0),
     (0, -1): (0.0, 90.0, 0.0),
@@ -63,19 +71,21 @@ def facing(
     """Heading [deg, counter-clockwise from the world's x] at a configuration, and how it is known.
 
     None where nothing says it. Feet stand beside each other, soles reach ahead of the ankles, and
-    knees turn about the axis from side to side.
+    knees turn about the axis from side to side. Where that leaves ahead and behind alike, the names
+    of the feet decide: front, hind, left, right, or letters such as ``FL``, ``RH``.
     """
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, q)
+    named = _named_ahead(feet)
     soles = [foot for foot in feet if foot.sole is not None]
     if not soles:
         left = _knees_axis(robot, q, feet)
         if left is None:
+            if np.any(named):
+                return _quarter(named), "its feet are named by where they are"
             return None, "its feet have no soles to show it, and its knees no axis in common"
-        ahead = np.array([left[1], -left[0]])
-        # Forward rather than backward, left rather than right.
-        ahead = ahead if ahead @ (1.0, 0.1) > 0 else -ahead
-        return _quarter(ahead), "its knees turn across; nothing distinguishes ahead from behind"
+        ahead, how = _sided(np.array([left[1], -left[0]]), named)
+        return _quarter(ahead), f"its knees turn across; {how or _TIE}"
     ahead = np.mean([(f.middle - data.oMi[f.joint].translation)[:2] for f in soles], axis=0)
     plain = _AHEAD * max(max(foot.sole.size) for foot in soles if foot.sole is not None)
     why = "its soles reach ahead of the ankles"
@@ -85,12 +95,49 @@ def facing(
         along = float(across @ ahead)
         ahead = across * along
         if abs(along) < plain:
-            # Forward rather than backward, left rather than right.
-            ahead = across if across @ (1.0, 0.1) > 0 else -across
-            why = "its feet stand beside each other; its soles do not distinguish ahead from behind"
+            ahead, how = _sided(across, named)
+            how = how or "its soles do not distinguish ahead from behind"
+            why = f"its feet stand beside each other; {how}"
     elif np.linalg.norm(ahead) < plain:
         return None, "its soles reach as far behind the ankles as ahead of them"
     return _quarter(ahead), why
+
+
+def _sided(
+    line: Float[np.ndarray, " 2"], named: Float[np.ndarray, " 2"]
+) -> tuple[Float[np.ndarray, " 2"], str]:
+    """The way along a line that names tell, and that they do; else forward, left before right."""
+    along = float(line @ named)
+    if abs(along) > _ALIKE * float(np.linalg.norm(named)):
+        return line * np.sign(along), "its feet's names tell ahead from behind"
+    return line if line @ (1.0, 0.1) > 0 else -line, ""
+
+
+def _named_ahead(feet: tuple[Foot, ...]) -> Float[np.ndarray, " 2"]:
+    """Ahead by the names of the feet: from hind to front, or across from right to left.
+
+    Zero where they tell nothing, or both tell opposite ways.
+    """
+    ends = _named_side(feet, _FRONT, _HIND)
+    left = _named_side(feet, _LEFT, _RIGHT)
+    across = np.array([left[1], -left[0]])
+    return np.zeros(2) if ends @ across < 0 else ends + across
+
+
+def _named_side(
+    feet: tuple[Foot, ...], one: frozenset[str], other: frozenset[str]
+) -> Float[np.ndarray, " 2"]:
+    """Unit vector from the feet whose names have one of some words to those of others, or zero."""
+    groups: list[list[np.ndarray]] = [[], []]
+    for foot in feet:
+        words = {word.lower() for word in _WORD.findall(foot.frame)}
+        for group, which in zip(groups, (other, one), strict=True):
+            if words & which:
+                group.append(foot.middle[:2])
+    if not all(groups):
+        return np.zeros(2)
+    way = np.mean(groups[1], axis=0) - np.mean(groups[0], axis=0)
+    return np.asarray(way / max(float(np.linalg.norm(way)), 1e-9))
 
 
 def _quarter(ahead: Float[np.ndarray, " 2"]) -> float:

@@ -15,6 +15,7 @@ from copsense.contact import Contact
 from copsense.content import ShortRepr
 from copsense.drives import Drives
 from copsense.json_data import json_data
+from copsense.listing import listed
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
 from copsense.robots.contact_soles import ContactAt, tip_text
@@ -27,6 +28,7 @@ from copsense.sole import tilt_text
 
 _UPRIGHT = 0.9  # z of the base's z axis from which it is as good as up
 _BENDS = (30.0, 15.0, 60.0)  # deg, of a straight knee
+_SHORT = 3  # joints of legs that end in points rather than soles
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class Inspection(ShortRepr):
             *(f"  {joint.name:{width}}  {joint}" for joint in self.joints),
             *(f"  loop {loop.name} ({loop.kind})" for loop in robot.drives.loops),
             "lowest at rest:" if self.feet else "lowest at rest: nothing was found",
-            *(f"  {foot}{_axes(foot)}" for foot in self.feet),
+            *_feet_lines(self.feet),
             "faces: " + _facing(self.heading, self.heading_reason),
         ]
         lines += [f"note: {note}" for note in self.notes]
@@ -234,6 +236,14 @@ def inspect_robot(
             )
             notes += tuple(note for note in told if note not in notes)
         return Inspection(robot, joints, feet, heading, why, found, reason, (*robot.notes, *notes))
+    notes = tuple(n for n in dict.fromkeys(notes) if n not in {foot.reason for foot in feet})
+    if not own and (blind := _blind_legs(robot, feet)):
+        reason = (
+            f"{listed(blind)} end in legs of few joints, of which nothing is known that could "
+            "touch the ground. Give their meshes (--package-dir), or --contact FRAME:point with "
+            "--contact-offset."
+        )
+        return Inspection(robot, joints, feet, heading, why, None, reason, (*robot.notes, *notes))
     if not own and any(foot.kind == "surface" and foot.sole is None for foot in feet):
         notes += (
             "no sole can be read under its feet: the rectangle of --sole is a guess. Measure it: "
@@ -254,6 +264,14 @@ def inspect_robot(
         tilted = [tilt_text(f.contact, f.sole.tilt) for f in feet if f.sole and f.sole.tilt]
         notes += (f"{'; '.join(tilted)}: the line levels them (--level-soles).",)
     return Inspection(robot, joints, feet, heading, why, found, reason, (*robot.notes, *notes))
+
+
+def _blind_legs(robot: Robot, feet: Sequence[Foot]) -> list[str]:
+    """Frames of feet without a known shape that hardly have soles: more than two short legs."""
+    if len(feet) <= 2:
+        return []
+    unknown = [foot for foot in feet if foot.kind == "surface" and foot.sole is None]
+    return [foot.frame for foot in unknown if len(robot.limb(foot.joint)) <= _SHORT]
 
 
 def _base_turn(robot: Robot, rest: Float[np.ndarray, " nq"]) -> tuple[float, float, float]:
@@ -299,6 +317,17 @@ def _turned(
     if any(rpy):
         turned[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(*np.radians(rpy))).coeffs()
     return turned
+
+
+def _feet_lines(feet: Sequence[Foot]) -> list[str]:
+    """A line for each foot; why no sole was read, once."""
+    first: dict[str, str] = {}
+    lines = []
+    for foot in feet:
+        like = first.setdefault(foot.reason, foot.frame) if foot.reason else foot.frame
+        known = like == foot.frame
+        lines.append(f"  {foot}{_axes(foot)}" if known else f"  {foot.frame}: no sole, as {like}")
+    return lines
 
 
 def _axes(foot: Foot) -> str:
