@@ -106,7 +106,7 @@ def facing(
 def _sided(
     line: Float[np.ndarray, " 2"], named: Float[np.ndarray, " 2"]
 ) -> tuple[Float[np.ndarray, " 2"], str]:
-    """The way along a line that names tell, and that they do; else forward, left before right."""
+    """The way along a line by the names, and that it is by them; else forward, left before right."""
     along = float(line @ named)
     if abs(along) > _ALIKE * float(np.linalg.norm(named)):
         return line * np.sign(along), "its feet's names tell ahead from behind"
@@ -116,7 +116,7 @@ def _sided(
 def _named_ahead(feet: tuple[Foot, ...]) -> Float[np.ndarray, " 2"]:
     """Ahead by the names of the feet: from hind to front, or across from right to left.
 
-    Zero where they tell nothing, or both tell opposite ways.
+    Zero where they say nothing, or contradict each other.
     """
     ends = _named_side(feet, _FRONT, _HIND)
     left = _named_side(feet, _LEFT, _RIGHT)
