@@ -106,7 +106,7 @@ def facing(
 def _sided(
     line: Float[np.ndarray, " 2"], named: Float[np.ndarray, " 2"]
 ) -> tuple[Float[np.ndarray, " 2"], str]:
-    """The way along a line by the names, and that it is by them; else forward, left before right."""
+    """The way along a line by names, and that it is by names; else forward, left before right."""
     along = float(line @ named)
     if abs(along) > _ALIKE * float(np.linalg.norm(named)):
         return line * np.sign(along), "its feet's names tell ahead from behind"
