@@ -6,7 +6,7 @@ Both commits are measured on this machine with the benchmarks of this checkout (
 commit here from `src/`, BASE (default: the commit before) from a copy under build/history. asv
 records the ratios there and compares them. What is slower by over 20 % is measured again, both
 commits in the other order; what is so twice is named, and ends in exit status 1. A minute, and once
-for each version of the kernels their compilation.
+for each version of the kernels a minute or two for their compilation.
 
 `asv publish --config benchmarks/asv.conf.json` draws what was recorded into build/history/html.
 """
