@@ -14,6 +14,7 @@ from copsense.arrays import check_type, checked_positions, finite_array, finite_
 from copsense.closures import RANK as CLOSURE_RANK
 from copsense.errors import InvalidInputError, UnreachablePostureError
 from copsense.freedom import missing_joints
+from copsense.listing import counted
 from copsense.posture_system import (
     PostureCost as PostureCost,
 )
@@ -108,7 +109,8 @@ def solve_posture(
     places = tuple(stance.placements if targets is None else targets)
     if len(places) != len(stance.contacts):
         raise InvalidInputError(
-            f"there are {len(places)} targets for {len(stance.contacts)} contacts. Give one each."
+            f"got {counted(len(places), 'target')} for {counted(len(stance.contacts), 'contact')}. "
+            "Give one each."
         )
     for contact, place in zip(stance.contacts, places, strict=True):
         check_type(place, pin.SE3, f"a target of contact {contact.name!r}", "Give a pin.SE3.")

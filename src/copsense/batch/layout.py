@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from copsense.content import ShortRepr
+from copsense.listing import counted
 from copsense.robot import Robot
 from copsense.stance import Stance
 
@@ -127,7 +128,8 @@ def why_not_covered(stance: Stance) -> str:
         if contact.kind not in _COVERED:
             return f"contact {contact.name!r} is {contact.kind}"
     if not 2 <= len(contacts) <= MOST_CONTACTS:
-        return f"there are {len(contacts)} contacts"
+        are = "is" if len(contacts) == 1 else "are"
+        return f"there {are} {counted(len(contacts), 'contact')}"
     if len(contacts) == 2 and all(contact.kind == "point" for contact in contacts):
         return "two points cannot hold a robot"
     if importlib.util.find_spec("numba") is None:

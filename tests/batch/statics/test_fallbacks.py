@@ -181,6 +181,11 @@ def test_an_unloaded_contact_is_a_failed_row(icub):
     assert "no normal force" in found.reasons[0, 0]
 
 
+def test_one_contact_is_said_in_the_singular(icub):
+    kernel = BatchKernel(icub.with_contacts(icub.contacts[:1]), [TORQUE])
+    assert kernel.fallback_reason == "there is 1 contact"
+
+
 def test_without_numba_the_clear_path_answers_all(case, monkeypatch):
     stance = case("icub")
     q = postures(stance, 2)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from copsense.listing import counted
 from copsense.stance import Stance
 
 
@@ -34,7 +35,8 @@ class PostureBatch:
 
     def __repr__(self) -> str:
         """How many rows it has, and how many of them a posture."""
-        return f"PostureBatch({int(self.converged.sum())} postures of {len(self)} rows)"
+        found = counted(int(self.converged.sum()), "posture")
+        return f"PostureBatch({found} of {counted(len(self), 'row')})"
 
 
 def empty_postures(stance: Stance, count: int) -> PostureBatch:

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int, UInt8
 from copsense.batch.statics.limit_states import IMPOSSIBLE, LIMIT_STATES, UNANSWERED, UNLOADED
 from copsense.errors import InfeasibleError, UnloadedContactError
 from copsense.limits import Limits, limit_rows
+from copsense.listing import counted
 from copsense.load_problem import LoadProblem
 from copsense.margins import MarginTable
 from copsense.stance import Stance
@@ -62,7 +63,7 @@ class LimitResult:
         """How many answers are in each state."""
         counts = np.bincount(self.state.ravel(), minlength=len(LIMIT_STATES))
         words = ", ".join(f"{n} {w}" for n, w in zip(counts, LIMIT_STATES, strict=True) if n)
-        return f"LimitResult({len(self.names)} rows; {words or 'nothing evaluated'})"
+        return f"LimitResult({counted(len(self.names), 'row')}; {words or 'nothing evaluated'})"
 
     @property
     def states(self) -> tuple[str, ...]:
