@@ -1,5 +1,7 @@
 """CoPs as a function of the posture: values, gradients, and what is said of the rest."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -78,6 +80,8 @@ def test_the_kernel_and_the_reference_pull_alike(stance_of, robot):
         g = rng.standard_normal((9, 3, stance.robot.model.nv))
         slow = ChartGradient(type(chart)(stance, compiled=False, **_named(chart))).pull(q, g)
         np.testing.assert_allclose(gradient.pull(q, g), slow, rtol=0, atol=1e-9)
+        again = pickle.loads(pickle.dumps(gradient))
+        assert np.array_equal(again.pull(q, g), gradient.pull(q, g))
 
 
 def _named(chart):

@@ -12,13 +12,16 @@ import inspect
 import logging
 import time
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from numba import njit, typeof, types
+import numba
+from numba import config, njit, typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from copsense.batch.machine_code import COMPILING_TAKES
 from copsense.path import COM_COORDINATES
 from copsense.polygon import ON_EDGE
 from copsense.posture import TOLERANCE
@@ -70,7 +73,7 @@ def bound(kernel: Any, arguments: tuple[Any, ...], what: str) -> Callable[..., A
     """
     new = not is_compiled(kernel)
     if new:
-        _LOG.warning("compiling %s, once on a machine; it takes half a minute or so", what)
+        _LOG.warning("compiling %s, once on a machine; it takes %s", what, COMPILING_TAKES)
     start = time.monotonic()
     found: Callable[..., Any] = kernel.compile(tuple(typeof(a) for a in arguments))
     if new:
@@ -117,10 +120,24 @@ def kept(jit: Callable[..., Any], function: Callable[..., Any], **options: Any) 
     plain = inspect.unwrap(function)  # a checker of shapes may have wrapped it
     try:
         dispatcher = jit(cache=True, **options)(plain)
-        dispatcher._cache._cache_file._source_stamp = _STAMP
-    except (RuntimeError, AttributeError):  # nowhere to keep it: compiled in every process
+        file = dispatcher._cache._cache_file
+        if not hasattr(file, "_source_stamp"):  # or older machine code would be called
+            raise AttributeError("no _source_stamp")
+        file._source_stamp = _STAMP
+    except (RuntimeError, AttributeError) as error:
+        if not (config.ENABLE_CUDASIM or config.DISABLE_JIT):  # there nothing is compiled
+            _warn_not_kept(
+                f"Numba {numba.__version__} keeps it otherwise than copsense knows; install another"
+                if isinstance(error, AttributeError)
+                else "there is no folder for it; set NUMBA_CACHE_DIR to one that can be written"
+            )
         dispatcher = jit(**options)(plain)
     return dispatcher
+
+
+@lru_cache  # there are two hundred functions
+def _warn_not_kept(why: str) -> None:
+    _LOG.warning("machine code is not kept on disk, so every process compiles it again: %s", why)
 
 
 def _jit(function: _Function, **more: Any) -> _Function:

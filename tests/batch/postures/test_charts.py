@@ -1,6 +1,7 @@
 """Charts: contacts in place, coordinates reached, failures as rows, no row aware of others."""
 
 import importlib.util
+import pickle
 
 import numpy as np
 import pinocchio as pin
@@ -194,6 +195,16 @@ def test_headings_are_absolute(case):
     x_axis = foot.rotation[:, 0]
     assert np.arctan2(x_axis[1], x_axis[0]) == pytest.approx(wanted[0], abs=MET)
     assert foot.translation[0] == pytest.approx(wanted[1], abs=MET)
+
+
+def test_a_chart_can_be_pickled_after_use(case):
+    from copsense.batch.postures.newton import solve_postures
+
+    chart = PostureChart(case("icub"), ["base_y"])
+    expected = chart.solve([chart.values]).configurations
+    again, known = pickle.loads(pickle.dumps(chart)), len(solve_postures.signatures)
+    assert np.array_equal(again.solve([chart.values]).configurations, expected)
+    assert len(solve_postures.signatures) == known  # nothing is compiled once more
 
 
 def test_what_cannot_be_is_a_row_with_its_reason(case):

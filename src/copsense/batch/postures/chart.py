@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from copsense.arrays import whole_number
 from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.machine_code import HoldsMachineCode
 from copsense.batch.postures.chart_values import checked_ends, checked_values
 from copsense.batch.postures.closed_search import closed_one
 from copsense.batch.postures.coordinates import (
@@ -38,12 +39,12 @@ from copsense.errors import InvalidInputError
 from copsense.freedom import held_com_axes, missing_joints
 from copsense.path import COM_COORDINATES
 from copsense.posture import TOLERANCE
-from copsense.stance import Stance
+from copsense.stance import Stance, check_stance
 
 _BLOCK = 512  # postures that a thread takes at a time
 
 
-class PostureChart:
+class PostureChart(HoldsMachineCode):
     """Postures of a stance by named coordinates, its contacts in place.
 
     A coordinate is one of
@@ -111,10 +112,11 @@ class PostureChart:
                 will be [m, rad]. One posture at a time always starts from the stance.
 
         Raises:
-            InvalidInputError: no name, one twice, or two that contradict each other; ends that are
-                not finite, or in the wrong order.
+            InvalidInputError: no stance; no name, one twice, or two that contradict each other;
+                ends that are not finite, or in the wrong order.
             UnknownNameError: a name that is not a coordinate.
         """
+        check_stance(stance)
         if not len(coordinates):
             raise InvalidInputError("a chart needs one coordinate at least, got none. Name one.")
         self.stance = stance
@@ -167,7 +169,7 @@ class PostureChart:
         return is_compiled(solve_postures)
 
     def compile(self) -> None:
-        """Have the kernel compiled now: seconds, once on a machine, kept on disk.
+        """Have the kernel compiled now, once on a machine; the code is kept on disk.
 
         It is logged as it begins and ends. Nothing is done where it is `compiled`.
         """
@@ -186,7 +188,8 @@ class PostureChart:
         Args:
             values: of the coordinates, one posture in each row (N, k) [m, rad].
             out: a batch of the same size to overwrite.
-            threads: threads that share the postures; the results do not depend on it.
+            threads: threads that share the postures; the results do not depend on it. Postures
+                that are solved one at a time, see `fallback_reason`, are so on one thread.
 
         Returns:
             Postures that meet every constraint within 1e-12. A row that has none, or that

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from copsense.arrays import whole_number
 from copsense.batch.blocks import fill_blocks
 from copsense.batch.layout import robot_layout
+from copsense.batch.machine_code import HoldsMachineCode
 from copsense.batch.postures.chart import PostureChart
 from copsense.batch.postures.coordinates import BASE, Limb, roll_pitch_yaw, solved_whole
 from copsense.batch.postures.reference_search import base_rates
@@ -25,7 +26,7 @@ _BLOCK = 512  # postures that a thread takes at a time
 _LOST = 1e-9  # singular values, of the largest, under which something is not decided
 
 
-class ChartGradient:
+class ChartGradient(HoldsMachineCode):
     """Turns gradients over velocities into gradients over a chart's coordinates.
 
     What a chart solves for follows from its coordinates, so a function of the posture is one of

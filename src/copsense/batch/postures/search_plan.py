@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from copsense.batch.layout import RobotLayout
+from copsense.batch.machine_code import writeable
 from copsense.batch.postures.coordinates import Coordinates
 from copsense.batch.workspace import Offsets
 from copsense.stance import Stance
@@ -101,17 +102,17 @@ def plan_search(
         coordinates.place,
         np.array(coordinates.com_axes, dtype=np.int64),
         int(coordinates.turned),
-        np.array(stance.q[3:7]),
+        stance.q[3:7],
         coordinates.positions,
-        np.ascontiguousarray(coordinates.rotations.transpose(0, 2, 1).reshape(nc, 9)),
+        coordinates.rotations.transpose(0, 2, 1).reshape(nc, 9),
         coordinates.slopes,
         np.array([k for limb in limbs for k in limb.contacts], dtype=np.int64),
         np.cumsum([0] + [len(limb.contacts) for limb in limbs]).astype(np.int64),
         np.array([u for limb in limbs for u in limb.unknowns], dtype=np.int64),
         np.cumsum([0] + [len(limb.unknowns) for limb in limbs]).astype(np.int64),
         carries,
-        np.array(coordinates.low),  # writeable, as all: else the kernel is compiled once more
-        np.array(coordinates.high),
+        coordinates.low,
+        coordinates.high,
     )
     m, most = (
         len(stance.component_index) + len(coordinates.com_axes),
@@ -136,4 +137,4 @@ def plan_search(
     starts, end = {}, offset.size
     for name, size in sizes.items():
         starts[name], end = end, end + size
-    return plan, SearchOffsets(**starts, size=end)
+    return writeable(plan), SearchOffsets(**starts, size=end)

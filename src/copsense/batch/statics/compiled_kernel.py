@@ -10,13 +10,16 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.layout import RobotLayout
+from copsense.batch.machine_code import HoldsMachineCode
 from copsense.batch.statics.batch_result import BatchResult, arrays_of
 from copsense.batch.statics.criteria import KernelCriteria
 from copsense.batch.workspace import workspace, workspace_offsets
 
 
-class CompiledKernel:
+class CompiledKernel(HoldsMachineCode):
     """The kernel for a robot, its contacts and some criteria; compiled when first called."""
+
+    _of_this_process = ("_code", "_device")
 
     def __init__(self, layout: RobotLayout, criteria: KernelCriteria, nq: int) -> None:
         """Lay out the memory."""

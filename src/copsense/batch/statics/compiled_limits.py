@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from copsense.batch.layout import RobotLayout
+from copsense.batch.machine_code import HoldsMachineCode
 from copsense.batch.statics.batch_result import BatchResult
 from copsense.batch.statics.criteria import KernelCriteria
 from copsense.batch.statics.kernel_limits import KernelLimits
@@ -17,7 +18,7 @@ from copsense.batch.statics.limit_result import LimitResult, limit_arrays
 from copsense.batch.workspace import WIDTH, workspace, workspace_offsets
 
 
-class CompiledLimits:
+class CompiledLimits(HoldsMachineCode):
     """The limited kernel of a robot, its contacts, some criteria and limits.
 
     It is compiled when first called, and only where limits are asked for.
