@@ -16,9 +16,11 @@ def fill_blocks(
             and an end.
         rows: how many there are.
         block: rows at a time.
-        threads: how many share them.
+        threads: how many share them, at most; no more are used than there are blocks.
     """
-    fills, blocks = [filler() for _ in range(threads)], -(-rows // block)
+    blocks = -(-rows // block)
+    threads = max(min(threads, blocks), 1)
+    fills = [filler() for _ in range(threads)]
 
     def run(share: int) -> None:
         for i in range(share, blocks, threads):

@@ -1,5 +1,7 @@
 """How batches are called: threads, memory to reuse, one posture at a time, bad input."""
 
+import copy
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -11,6 +13,7 @@ from support.stances import postures, served
 import copsense
 from copsense.arrays import whole_number
 from copsense.batch import BatchKernel, evaluate_batch
+from copsense.batch.blocks import fill_blocks
 from copsense.batch.statics.batch_result import array_names
 
 TORQUE = copsense.minimum_torque()
@@ -41,7 +44,7 @@ def test_results_are_written_into_out(case, many):
     kernel = BatchKernel(case("icub"), [TORQUE])
     out = kernel.empty(100)
     first = kernel.evaluate(many[:100], out=out)
-    assert first.gradient is out.gradient
+    assert first is out
     before = first.gradient.copy()
     kernel.evaluate(many[100:200], out=out)
     assert not np.array_equal(out.gradient, before)
@@ -58,6 +61,42 @@ def test_one_posture_is_a_batch_of_one(case, many):
             np.testing.assert_allclose(getattr(one, name)[0], batch[name][i], rtol=1e-9, atol=1e-11)
     assert kernel.one(many[0]).gradient is kernel.one(many[1]).gradient
     assert len(one) == 1
+
+
+def test_out_holds_the_reasons_of_its_rows_alone(case):
+    stance = case("talos on slopes")
+    kernel, q = BatchKernel(stance, [TORQUE], gains=False), postures(stance, 3)
+    off = q.copy()
+    off[1, 2] += 1e-5  # no longer on its planes
+    out = kernel.empty(3)
+    assert list(kernel.evaluate(off, out=out).reasons) == list(out.reasons) == [(1, 0)]
+    kernel.evaluate(q, out=out)
+    assert not out.reasons
+
+
+def test_a_kernel_can_be_copied_after_use_and_compiles_nothing_again(case, many):
+    from copsense.batch.statics.kernel import evaluate_postures
+
+    kernel = BatchKernel(case("icub"), [TORQUE])
+    expected = kernel.evaluate(many[:9]).gradient
+    kernel.one(many[0])
+    known = len(evaluate_postures.signatures)
+    for other in (pickle.loads(pickle.dumps(kernel)), copy.deepcopy(kernel)):
+        assert np.array_equal(other.evaluate(many[:9]).gradient, expected)
+        assert np.array_equal(other.one(many[0]).com, kernel.one(many[0]).com)
+    assert len(evaluate_postures.signatures) == known
+
+
+def test_there_are_no_more_threads_than_blocks():
+    made, rows = [], []
+
+    def filler():
+        made.append(len(made))
+        return lambda start, stop: rows.extend(range(start, stop))
+
+    fill_blocks(filler, 25, 10, threads=5000)
+    assert len(made) == 3
+    assert sorted(rows) == list(range(25))
 
 
 @pytest.mark.parametrize(
@@ -96,6 +135,7 @@ def test_results_are_printed_in_one_line(case, many):
     )
     failed = replace(found, reasons={(1, 0): "no load"})
     assert "3 postures, 1 failed;" in repr(failed)
+    assert "(1 posture;" in repr(evaluate_batch(case("icub"), many[:1], [TORQUE]))
 
 
 def test_no_posture_is_an_empty_batch(case):

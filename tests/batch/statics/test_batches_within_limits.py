@@ -1,6 +1,7 @@
 """A batch within limits gives what the reference gives within them, posture by posture."""
 
 import importlib.util
+import pickle
 
 import numpy as np
 import pytest
@@ -170,6 +171,8 @@ def test_a_row_does_not_depend_on_the_others(answers, case):
 
 
 def test_results_without_limits_are_put_within_them(answers, case):
+    from copsense.batch.statics.limited_kernel import limit_postures
+
     stance, q, limits, found = answers("icub")
     assert (found.limits.state == INFEASIBLE).any()
     free = BatchKernel(stance, served(stance))
@@ -186,6 +189,14 @@ def test_results_without_limits_are_put_within_them(answers, case):
         kernel.limited(q[:2], free.evaluate(q))
     with pytest.raises(copsense.errors.InvalidInputError, match="the batch has no limits"):
         free.limited(q, free.evaluate(q))
+    with pytest.raises(copsense.errors.InvalidInputError, match=r"other configurations: .* row 0"):
+        kernel.limited(q[::-1].copy(), free.evaluate(q))
+    with pytest.raises(copsense.errors.InvalidInputError, match="within limits"):
+        kernel.limited(q, found)
+    again = pickle.loads(pickle.dumps(kernel))
+    known = len(limit_postures.signatures)
+    same_bits(again.limited(q, free.evaluate(q)), found)
+    assert len(limit_postures.signatures) == known  # nothing is compiled once more
 
 
 def test_both_sides_of_a_change_are_the_references(icub):

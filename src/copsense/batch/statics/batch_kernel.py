@@ -8,7 +8,7 @@ the reference answers all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TypeGuard
@@ -21,12 +21,14 @@ from copsense.arrays import finite_array, whole_number
 from copsense.batch.blocks import fill_blocks
 from copsense.batch.devices import is_on_device
 from copsense.batch.layout import robot_layout, why_not_covered
+from copsense.batch.machine_code import HoldsMachineCode
 from copsense.batch.statics.batch_result import (
     BatchResult,
     arrays_of,
     check_out,
     clear_unanswered,
     empty_result,
+    set_reasons,
 )
 from copsense.batch.statics.compiled_kernel import CompiledKernel
 from copsense.batch.statics.compiled_limits import CompiledLimits
@@ -42,14 +44,15 @@ from copsense.content import FrozenMapping
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
-from copsense.stance import Stance
-from copsense.statics import WrenchPolicy, policy_name
+from copsense.stance import Stance, check_stance
+from copsense.statics import WrenchPolicy, named_criteria
 
 _CHUNK = 512  # postures whose results stay in a core's cache
+_SAME_COM = 1e-9  # m, by which two ways to compute it may differ
 _UNIT = 1e-6  # by which a quaternion may miss unit length, as in `Robot.check_configuration`
 
 
-class BatchKernel:
+class BatchKernel(HoldsMachineCode):
     """A robot, its contacts and some criteria, made ready for many configurations.
 
     Attributes:
@@ -63,6 +66,7 @@ class BatchKernel:
         by_reference: criterion -> why the reference answers it where the kernel does its part.
     """
 
+    _of_this_process = ("_single",)
     stance: Stance
     criteria: tuple[Criterion | WrenchPolicy, ...]
     names: tuple[str, ...]
@@ -79,7 +83,7 @@ class BatchKernel:
     def __init__(
         self,
         stance: Stance,
-        criteria: Sequence[Criterion | WrenchPolicy],
+        criteria: Iterable[Criterion | WrenchPolicy],
         limits: Limits | None = None,
         *,
         gains: bool = True,
@@ -93,28 +97,23 @@ class BatchKernel:
             gains: compute CoM gain, tipping edge and CoM travels (to tipping, to unloading) too.
 
         Raises:
-            InvalidInputError: no criterion, two of one name, weights or limits that do not fit.
+            InvalidInputError: no stance; no criterion, two of one name, weights or limits that do
+                not fit.
             UnknownNameError: limits of a contact or a joint that does not exist.
         """
-        if isinstance(criteria, Criterion):
-            raise InvalidInputError("criteria is a single criterion. Give a list of them.")
-        self.stance, self.criteria, self.gains = stance, tuple(criteria), gains
-        names = [str(c.name) if isinstance(c, Criterion) else policy_name(c) for c in criteria]
-        if not names or len(set(names)) != len(names):
-            raise InvalidInputError(
-                f"a batch needs criteria of distinct names, got {', '.join(names) or 'none'}. "
-                "Give at least one; Criterion.named(...) renames one."
-            )
-        self.names = tuple(names)
+        check_stance(stance)
+        chosen = named_criteria(criteria, "a batch")
+        self.stance, self.criteria, self.gains = stance, tuple(chosen.values()), gains
+        self.names = tuple(chosen)
         self.limits = optional_limits(limits)
         self._template: LimitResult | None = None
         if self.limits is not None:
-            if policies := [n for n, c in zip(names, criteria, strict=True) if not _is_given(c)]:
+            if policies := [n for n, c in chosen.items() if not isinstance(c, Criterion)]:
                 raise InvalidInputError(
                     f"limits apply to a Criterion; the policy {policies[0]!r} has to respect them "
                     "itself. Leave limits or the policy out."
                 )
-            self._template = limit_template(stance, self.limits, len(names))
+            self._template = limit_template(stance, self.limits, len(chosen))
         self._single: _Single | None = None
         self._nq = int(stance.robot.model.nq)
         self._nothing = self.empty(0)
@@ -150,7 +149,7 @@ class BatchKernel:
         return self._kernel.compiled and (self.limits is None or self._within.compiled)
 
     def compile(self) -> None:
-        """Have the kernel compiled now: seconds, once on a machine, kept on disk.
+        """Have the kernel compiled now, once on a machine; the code is kept on disk.
 
         It is logged as it begins and ends. Nothing is done where it is `compiled`.
         """
@@ -173,7 +172,11 @@ class BatchKernel:
         threads: int = 1,
         device: str = "cpu",
     ) -> BatchResult:
-        """Evaluate every criterion at every configuration; see `evaluate_batch`."""
+        """Evaluate every criterion at every configuration; see `evaluate_batch`.
+
+        Returns:
+            `out` where it is given.
+        """
         q = self._checked(configurations)
         threads = whole_number(threads, "threads")
         sent = is_on_device(device)
@@ -196,22 +199,27 @@ class BatchKernel:
         Args:
             configurations: one in each row (N, nq).
             own: of the same criteria at these configurations, from a batch without limits. What
-                failed there fails here.
+                failed there fails here. That it is of these is checked by the CoM of three rows.
             threads: as of `evaluate`.
 
         Raises:
-            InvalidInputError: the batch has no limits, or `own` is of other criteria or postures.
+            InvalidInputError: the batch has no limits, or `own` is of other criteria or postures,
+                or within limits.
         """
         q = self._checked(configurations)
         if self.limits is None:
             raise InvalidInputError("the batch has no limits. Give them to BatchKernel.")
         result = self.empty(len(q))
         given, wanted = arrays_of(own), arrays_of(result)
+        remedy = "Give the result of a batch without limits at these."
         if own.criteria != self.names or any(a.shape != wanted[n].shape for n, a in given.items()):
             raise InvalidInputError(
                 f"own is {own!r}, and not of the {len(q)} configurations and the criteria "
-                f"{', '.join(self.names)}. Give the result of a batch without limits at these."
+                f"{', '.join(self.names)}. {remedy}"
             )
+        if own.limits is not None:
+            raise InvalidInputError(f"own is {own!r} within limits. {remedy}")
+        self._check_same(q, own.com, remedy)
         for name, array in given.items():
             wanted[name][...] = array
         left = np.full((len(q), len(self.names)), bool(self.fallback_reason))
@@ -224,8 +232,9 @@ class BatchKernel:
         if not self.fallback_reason and len(q):
             self._fill(q, result, doubtful, whole_number(threads, "threads"), within=True)
         doubtful[failed] = 0
-        answered = self._answered(q, result, doubtful)
-        return replace(answered, reasons={**answered.reasons, **own.reasons})
+        self._answered(q, result, doubtful)
+        set_reasons(result, {**result.reasons, **own.reasons})
+        return result
 
     def one_sided_gains(
         self, configurations: ArrayLike, result: BatchResult
@@ -271,7 +280,7 @@ class BatchKernel:
         if not single.evaluate(row):
             return single.result
         self.stance.robot.check_configuration(row)
-        return self._answered(single.q, single.result, single.doubtful)
+        return self._answered(single.q, replace(single.result), single.doubtful)
 
     def _fill(
         self,
@@ -321,7 +330,18 @@ class BatchKernel:
                 reasons[row, column] = reason
         if result.limits is not None:
             reasons |= clear_unanswered(result, result.limits, doubtful)
-        return replace(result, reasons=reasons)
+        set_reasons(result, reasons)
+        return result
+
+    def _check_same(self, q: np.ndarray, com: np.ndarray, remedy: str) -> None:
+        """Reject results of other postures: the first, the middle or the last one differs."""
+        for row in sorted({0, len(q) // 2, len(q) - 1}) if len(q) else ():
+            here = self.stance.at(q[row], check=False).com
+            if np.any(np.abs(com[row] - here) > _SAME_COM):  # false where a row has none
+                raise InvalidInputError(
+                    f"own is of other configurations: the CoM of its row {row} is "
+                    f"{np.abs(com[row] - here).max():.2g} m from that of row {row}. {remedy}"
+                )
 
     def _checked(self, configurations: ArrayLike) -> Float[np.ndarray, "N nq"]:
         robot, nq = self.stance.robot, self._nq
@@ -373,7 +393,7 @@ class _Single:
 def evaluate_batch(
     stance: Stance,
     configurations: ArrayLike,
-    criteria: Sequence[Criterion | WrenchPolicy],
+    criteria: Iterable[Criterion | WrenchPolicy],
     limits: Limits | None = None,
     *,
     gains: bool = True,
@@ -390,8 +410,11 @@ def evaluate_batch(
         limits: what wrenches and torques must respect; None for nothing. The results are then those
             within the limits, and `BatchResult.limits` says which limits press.
         gains: compute CoM gain, tipping edge and CoM travels (to tipping, to unloading) too.
-        out: results of the same shape to overwrite, so that nothing is allocated.
-        threads: threads that share the postures; the results do not depend on it.
+        out: results of the same shape to overwrite, reasons included, and to return: nothing is
+            allocated.
+        threads: threads that share the postures; the results do not depend on it. Rows that the
+            reference answers (`BatchKernel.fallback_reason` and `by_reference`) are answered on one
+            thread, one after the other.
         device: ``"cpu"``, or ``"cuda"`` for a graphics processor of NVIDIA's, which evaluates what
             the compiled kernel covers, without limits; the processor puts the results within them.
             Results differ in rounding alone.
@@ -407,10 +430,6 @@ def evaluate_batch(
     """
     batch = BatchKernel(stance, criteria, limits, gains=gains)
     return batch.evaluate(configurations, out=out, threads=threads, device=device)
-
-
-def _is_given(criterion: object) -> bool:
-    return isinstance(criterion, Criterion)
 
 
 def _is_row(value: object, row: np.ndarray) -> bool:

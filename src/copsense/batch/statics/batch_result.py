@@ -11,8 +11,9 @@ from jaxtyping import Float, Int
 
 from copsense.batch.statics.limit_result import LimitResult, limit_arrays
 from copsense.batch.statics.limit_states import IMPOSSIBLE, UNLOADED
-from copsense.content import freeze
+from copsense.content import FrozenMapping, freeze
 from copsense.errors import InvalidInputError
+from copsense.listing import counted
 from copsense.stance import Stance
 
 
@@ -72,8 +73,8 @@ class BatchResult:
         """Its size, criteria and contacts."""
         failed = f", {len(self.reasons)} failed" if self.reasons else ""
         return (
-            f"BatchResult({len(self)} postures{failed}; criteria {', '.join(self.criteria)}; "
-            f"contacts {', '.join(self.contacts)})"
+            f"BatchResult({counted(len(self), 'posture')}{failed}; "
+            f"criteria {', '.join(self.criteria)}; contacts {', '.join(self.contacts)})"
         )
 
     @property
@@ -165,6 +166,11 @@ def check_out(out: object, expected: BatchResult, count: int, *, gains: bool) ->
                 raise InvalidInputError(
                     f"out.limits.{name} does not fit the limits of the batch. {remedy}"
                 )
+
+
+def set_reasons(result: BatchResult, reasons: Mapping[tuple[int, int], str]) -> None:
+    """Give a result that was filled its reasons; those of what it held before go."""
+    object.__setattr__(result, "reasons", FrozenMapping(reasons))
 
 
 def clear_unanswered(
