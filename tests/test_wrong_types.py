@@ -32,6 +32,10 @@ CALLS = {
     "push_limits(s, 'base_link', [pol])": NO_CRITERION,
     "map_postures(s, grid, mt, 'absent/x.zarr')": "criteria is a single criterion",
     "map_postures(s, grid, 3, 'absent/x.zarr')": NO_LIST,
+    "map_postures(s, [[0.0, 0.1]], [mt], 'absent/x.zarr')": "[[0.0, 0.1]] is not a grid or",
+    "evaluate_batch(s, [s.q], mt)": "criteria is a single criterion",
+    "evaluate_batch(s, [s.q], 'minimum-torque')": NO_LIST,
+    "evaluate_batch(s, [s.q], (c for c in [mt, mt]))": "distinct names, got minimum-torque",
     "balance(s, 'x')": NO_CRITERION,
     "balance(s, 'minimum-wrench')": "Give one, such as criterion_named('minimum-wrench')",
     "balance(s, pol)": NO_CRITERION,
@@ -62,6 +66,8 @@ CALLS = {
     "next_active_set_change(s, mt, 'friction')": NO_LIMITS,
     "design_criterion(p, 'friction', 'length')": NO_LIMITS,
     "analyse('icub')": NO_STANCE,
+    "evaluate_batch('icub', [s.q], [mt])": NO_STANCE,
+    "PostureChart('icub', ['com_y'])": NO_STANCE,
     "balance('icub')": NO_STANCE,
     "BalancingController('icub', mt)": NO_STANCE,
     "check_sensitivity('icub', mt)": NO_STANCE,
@@ -201,12 +207,14 @@ ACCEPTED = (
     "Drives(loops=Loop('a', 'b'))",
     "Contact('l_sole', friction=np.float32(0.5))",
     "solve_equilibrium(s, pol_of_mt)",
+    "BatchKernel(s, (c for c in [mt, one]))",
 )
 
 SETTING = """
 import numpy as np
 import copsense
 from copsense import *
+from copsense.batch import *
 from copsense.controllers import *
 from copsense.drives import *
 from copsense.design import family_named

@@ -93,8 +93,8 @@ class Model:
         self.stance = stance
         self.words = tuple(words) or (stance.robot.name,)
         usual = (minimum_wrench(1.0), minimum_torque())
-        self.criteria = tuple(usual if criteria is None else criteria)
-        named_criteria(self.criteria, "an explorer", policies=False)
+        given = usual if criteria is None else criteria
+        self.criteria = tuple(named_criteria(given, "an explorer", policies=False).values())
         if limits is not None:
             check_type(limits, Limits, "limits", "Give copsense.Limits(...).")
         self.limits = limits

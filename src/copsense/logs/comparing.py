@@ -71,8 +71,8 @@ def compare_log(
     skip = finite_number(skip, "the beginning of a log to skip [s]")
     postures = whole_number(postures, "the number of postures of a log", least=LEAST)
     encoders = encoder_error(encoders)
-    chosen = (minimum_torque(), minimum_wrench(1.0)) if criteria is None else tuple(criteria)
-    named_criteria(chosen, "the comparison of a log", policies=False)
+    usual = (minimum_torque(), minimum_wrench(1.0)) if criteria is None else criteria
+    chosen = tuple(named_criteria(usual, "the comparison of a log", policies=False).values())
     aligned = align_log(log, robot, contacts=contacts, base=base, postures=postures)
     model, feet, motion, rows = aligned.robot, aligned.contacts, aligned.motion, aligned.rows
     findings, notes, wrenches = [*aligned.findings], [*aligned.notes], aligned.wrenches

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from copsense._version import __version__
-from copsense.arrays import whole_number
+from copsense.arrays import check_type, whole_number
 from copsense.content import ShortRepr
 from copsense.criterion import Criterion
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, optional_limits
-from copsense.maps.sampling import Sample, Sampling
+from copsense.maps.sampling import Grid, Sample, Sampling
 from copsense.provenance import model_digest, plain
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, with_tie_breaks
@@ -56,6 +56,8 @@ class MapPlan(ShortRepr):
         """Validate the criteria and the size of a chunk."""
         check_stance(self.stance)
         check_at_rest(self.stance, "a map")
+        remedy = 'Give one, such as Grid((Axis("com_y", -0.03, 0.03, 41),)) or Sample(...).'
+        check_type(self.sampling, (Grid, Sample), "a grid or sample of postures", remedy)
         object.__setattr__(self, "limits", optional_limits(self.limits))
         given = named_criteria(self.criteria, "a map")
         chosen, notes = with_tie_breaks([self.stance], given)
