@@ -28,11 +28,13 @@ import copsense
 from copsense.batch import BatchKernel
 from copsense.batch.statics.batch_result import arrays_of
 from copsense.errors import CopsenseError
+from copsense.extras import require
 
 ROBOTS = ("icub", "talos", "anymal_c")
 ROUNDS = 7
 COUNT = 131072
 CRITERIA = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
+REMEDY = 'pip install "copsense[gpu]" brings it.'
 BOUND = 1e-9  # of a difference, relative to one more than the value
 
 
@@ -127,6 +129,9 @@ def compile_for(capability):
 
     Nothing runs. CUDA's compilers come with copsense[gpu]; no driver is needed.
     """
+    require("numba_cuda", "compiling for a graphics processor")
+    check_compiler()
+    assembler()
     from numba import cuda, typeof
 
     from copsense.batch.statics import device_kernel
@@ -168,6 +173,16 @@ def compile_for(capability):
     print("\n".join(re.findall(r"\d+ bytes stack frame.*|Used \d+ registers.*", done.stderr)))
 
 
+def check_compiler():
+    """End with one line where CUDA's compiler cannot be loaded."""
+    from cuda import pathfinder
+
+    try:
+        pathfinder.load_nvidia_dynamic_lib("nvrtc")
+    except pathfinder.DynamicLibNotFoundError:
+        sys.exit("error: CUDA's compiler (NVRTC) is not installed. " + REMEDY)
+
+
 def assembler():
     """Where the wheel of CUDA's compilers has ptxas."""
     for name in ("nvidia-cuda-nvcc-cu12", "nvidia-cuda-nvcc"):
@@ -178,7 +193,7 @@ def assembler():
         for file in files:
             if file.name == "ptxas":
                 return str(file.locate())
-    sys.exit('error: CUDA\'s assembler is not installed. pip install "copsense[gpu]" brings it.')
+    sys.exit("error: CUDA's assembler (ptxas) is not installed. " + REMEDY)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,8 @@ from PIL import Image
 from support.commands import copsense
 from support.fences import blocks, commands
 
+from copsense.batch.machine_code import COMPILING_TAKES
+
 ROOT = Path(__file__).parents[1]
 EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -117,6 +119,10 @@ def test_tables_of_the_paper_give_what_the_benchmarks_pages_give():
         known = set(re.findall(r"[\d.]*\d", page))
         for number in re.findall(r"[\d.]*\d", table):
             assert number in known, f"paper.md gives {number}, benchmarks/{name}.md does not"
+
+
+def test_questions_say_how_long_compiling_takes_as_messages_do():
+    assert COMPILING_TAKES in " ".join((ROOT / "docs" / "faq.md").read_text("utf-8").split())
 
 
 def test_the_paper_cites_what_its_bibliography_holds():

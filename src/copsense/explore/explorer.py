@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from copsense.batch.machine_code import COMPILING_TAKES
 from copsense.blas import one_blas_thread
 from copsense.design import Objective
 from copsense.errors import CopsenseError
@@ -216,7 +217,7 @@ class Explorer:
 
     def _compile(self) -> None:
         self._status = (
-            "the search for postures is compiled, once on a machine (half a minute or so); until "
+            f"the search for postures is compiled, once on a machine ({COMPILING_TAKES}); until "
             "then one posture at a time"
         )
         self._worker.again()

@@ -1,5 +1,6 @@
 """The kernel on a device: simulated, every thread in Python, by Numba's own simulator."""
 
+import importlib
 import json
 import os
 import subprocess
@@ -51,6 +52,23 @@ print(json.dumps({
     "limited": difference("solo12", lambda _: [TORQUE], copsense.Limits(friction=0.1), 1, 0),
 }))
 """
+
+
+def test_compiling_for_a_device_without_the_compiler_is_one_line(monkeypatch):
+    pathfinder = pytest.importorskip("cuda.pathfinder")
+    monkeypatch.syspath_prepend(Path(__file__).parents[3] / "benchmarks")
+    monkeypatch.delitem(sys.modules, "postures", raising=False)
+    gpu = importlib.import_module("gpu")
+
+    def absent(name):
+        raise pathfinder.DynamicLibNotFoundError(f"no {name}")
+
+    monkeypatch.setattr(pathfinder, "load_nvidia_dynamic_lib", absent)
+    monkeypatch.setattr(sys, "argv", ["gpu.py", "--compile", "9.0"])
+    with pytest.raises(SystemExit, match=r'^error: CUDA.*pip install "copsense\[gpu\]"'):
+        gpu.main()
+    for name in ("gpu", "postures"):
+        monkeypatch.delitem(sys.modules, name)
 
 
 def run(code, **environment):
