@@ -10,6 +10,7 @@ the packages libcdd-dev and libgmp-dev); one that cannot be installed is a row w
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -189,6 +190,7 @@ def counter_clockwise(polygon: list[list[float]]) -> np.ndarray:
 
 def main() -> None:
     """Run everything; write the page."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     BUILD.mkdir(parents=True, exist_ok=True)
     slopes, level = common_stance(level=False), common_stance(level=True)
     cases = {

@@ -12,6 +12,7 @@ and that of the lattice by the row of a map of a million. The last lines are the
 the same rows, and whether any row is lost or has another posture.
 """
 
+import argparse
 import platform
 import statistics
 import time
@@ -157,6 +158,7 @@ def cpu_time(run):
 
 def main():
     """Measure every line once a round, and print the tables."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     lines = rows()
     times = {name: [] for name in lines}
     for round_number in range(ROUNDS + 1):

@@ -8,6 +8,7 @@ with the acceleration of the reference's posture. Takes about two minutes.
 
 from __future__ import annotations
 
+import argparse
 import os
 from pathlib import Path
 
@@ -35,6 +36,7 @@ posture (`--feedforward`); *as in the paper* it knows that of the centre of mass
 
 def main() -> None:
     """Sway by every kind of torques."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     stance, criterion = copsense.load_stance("icub"), copsense.minimum_torque()
     lines = [TEXT]
     for amplitude, frequency in SWAYS:

@@ -4,7 +4,6 @@ import ast
 import json
 import pkgutil
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from PIL import Image
 from support.commands import copsense
 from support.fences import blocks, commands
+from support.sessions import Reader, steps
 
 from copsense.batch.machine_code import COMPILING_TAKES
 
@@ -53,7 +53,6 @@ def test_a_notebook_asserts_a_number_and_holds_no_outputs(notebook):
 @pytest.mark.parametrize(
     "page",
     [
-        "README.md",
         "docs/adding.md",
         "docs/balancing.md",
         "docs/explore.md",
@@ -71,23 +70,45 @@ def test_snippets_of_a_page_run_from_top_to_bottom(page, tmp_path, monkeypatch):
     snippets = blocks(ROOT / page, "python")
     assert snippets
     exec(compile("\n".join(snippets), page, "exec"), {"__name__": "snippet"})
-    if page == "README.md":
-        shown, drawn = (
-            np.asarray(Image.open(at / "icub.png").convert("RGB"), dtype=float)
-            for at in (ROOT / "docs" / "images", tmp_path)
-        )
-        assert np.abs(shown - drawn).mean() < 0.1  # of 255: the picture is what the lines make
 
 
-def test_commands_of_the_readme_run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    lines = [
-        line for line in commands(ROOT / "README.md", "console") if line.startswith("copsense")
-    ]
-    assert lines
-    for command in lines:
-        done = copsense(*shlex.split(command)[1:])
-        assert done.code == 0, f"{command}\n{done.err}"
+def run(*arguments):
+    done = copsense(*arguments, together=True)
+    return done.code, done.out
+
+
+@pytest.fixture(scope="module")
+def read(tmp_path_factory):
+    """The folder of someone who did what the README says, from top to bottom."""
+    # What a command or block writes is there for those below it, and in their way.
+    folder, page = tmp_path_factory.mktemp("readme"), ROOT / "README.md"
+    typed = set(commands(page, "console"))  # an sh block needs files of the reader's own
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        reader = Reader(folder, run)
+        for step in steps(page):
+            if step.kind == "python" or step.text in typed:
+                reader.follow(step)
+                typed.discard(step.text)
+    assert not typed, "these are commands of the page, and were not typed"
+    return folder
+
+
+def test_the_readme_runs_as_it_stands_in_one_folder(read):
+    shown, drawn = (
+        np.asarray(Image.open(at / "icub.png").convert("RGB"), dtype=float)
+        for at in (ROOT / "docs" / "images", read)
+    )
+    assert np.abs(shown - drawn).mean() < 0.1  # of 255: the picture is what the lines make
+
+
+def test_what_the_tutorial_asks_a_map_is_answered_by_the_readmes(read, monkeypatch):
+    # The same coordinates and ranges as the tutorial's own map, and there already.
+    monkeypatch.chdir(read)
+    page = ROOT / "docs" / "tutorials" / "million_postures.md"
+    asked = [step.text for step in steps(page) if step.kind == "python"]
+    assert len(asked) == 2
+    exec(compile("\n".join(asked), page.name, "exec"), {"__name__": "page"})
 
 
 def new_names():

@@ -106,3 +106,15 @@ def test_a_remedy_in_python_names_the_option_that_does_the_same(modules):
             if "tie_break such" in text and "--criterion" not in text:
                 one_sided.append(f"{path.relative_to(ROOT)}: {text!r}")
     assert not one_sided, "\n".join(one_sided)
+
+
+def test_a_script_reads_its_arguments_before_it_works():
+    scripts = [*(ROOT / "tools").glob("*.py"), *(ROOT / "benchmarks").glob("*.py")]
+    sources = {path.name: path.read_text("utf-8") for path in scripts}
+    assert len(sources) > 10
+    deaf = [
+        name
+        for name, source in sources.items()
+        if "\ndef main(" in source and "argparse" not in source and "sys.argv" not in source
+    ]
+    assert not deaf, "these ignore --help, and write what they write"

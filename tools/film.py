@@ -5,6 +5,7 @@ Run: .venv/bin/python tools/film.py   (a minute or two; writes docs/images/film.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -188,6 +189,7 @@ def frames(sides: list[Side], predicted: dict[str, float]) -> list[Image.Image]:
 
 def main() -> None:
     """Simulate, draw, and write the film."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     stance = copsense.load_stance("icub")
     lean = Scenario(7.0, Ramp(0.055, speed=0.012), control_period=2e-3)
     path = copsense.lateral_sweep(stance, -0.055, 0.055, 23)

@@ -9,6 +9,7 @@ Run: .venv/bin/python tools/viser_notices.py   (needs npm and viser; writes
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 import shutil
@@ -96,6 +97,7 @@ def conditions(name: str) -> str:
 
 def main() -> None:
     """Install, follow, write."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     packages = closure(imported(install()))
     head = (
         f"The 3-D view is viser {version('viser')} (MIT by its metadata, Apache-2.0 by its "

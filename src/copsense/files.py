@@ -17,13 +17,16 @@ from copsense.arrays import check_type, finite_array
 from copsense.errors import CopsenseError, InvalidInputError, OutputError
 
 
-def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool) -> Path:
+def check_output(
+    path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool, option: str = "--force"
+) -> Path:
     """A path that can be written, checked before the work starts.
 
     Args:
         path: where to write.
         suffixes: the suffixes that the writer knows; empty for any.
         overwrite: whether an existing file may be replaced.
+        option: of the shell that lets it be replaced.
 
     Raises:
         InvalidInputError: another suffix.
@@ -39,7 +42,9 @@ def check_output(path: str | Path, *, suffixes: tuple[str, ...], overwrite: bool
     if _holds(path.is_dir):
         raise OutputError(f"{path} is a folder. Give the path of a file.")
     if _holds(path.exists) and not overwrite:
-        raise OutputError(f"{path} exists already. Give another path, or --force (overwrite=True).")
+        raise OutputError(
+            f"{path} exists already. Give another path, or {option} (overwrite=True)."
+        )
     folder = path.parent
     if not _holds(folder.is_dir):
         raise OutputError(f"there is no folder {folder} to write {path.name} in. Create it first.")

@@ -67,7 +67,7 @@ def test_loads_payloads_limits_and_criteria_come_back(icub, tmp_path):
     read = StanceFile.read(file)
     assert read.limits == limits
     assert list(read.criteria) == criteria
-    with pytest.raises(OutputError, match=r"stance\.toml"):
+    with pytest.raises(OutputError, match=r"stance\.toml exists already\. .*--force-stance "):
         save_stance(stance, file)
 
 

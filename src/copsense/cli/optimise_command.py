@@ -169,6 +169,7 @@ def optimise(
     from copsense.files import check_output
     from copsense.optimisation import optimise as best_stance
     from copsense.optimisation import pareto_front
+    from copsense.robots.stance_file import check_stance_output
 
     kept, overwrite = options.pop("save_stance"), options.pop("force_stance")
     if picture is not None:
@@ -184,7 +185,7 @@ def optimise(
                 "Leave --pareto out, and give --require to choose the point."
             )
     if kept is not None:
-        check_output(kept, suffixes=(".toml",), overwrite=overwrite)
+        check_stance_output(kept, overwrite=overwrite)
         if pareto is not None:
             raise InvalidInputError(
                 "a front has a stance for each point, and --save-stance writes one. Leave --pareto "

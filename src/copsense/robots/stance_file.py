@@ -230,6 +230,11 @@ class StanceFile:
         return chart_posture(loaded, at)
 
 
+def check_stance_output(path: str | Path, *, overwrite: bool) -> Path:
+    """A path that a stance file can be written to, as `copsense.files.check_output` says."""
+    return check_output(path, suffixes=(".toml",), overwrite=overwrite, option="--force-stance")
+
+
 def save_stance(
     stance: Stance,
     path: str | Path,
@@ -259,7 +264,7 @@ def save_stance(
         InvalidInputError: where the robot came from is not known, or is another robot.
     """
     check_at_rest(stance, "a stance file")
-    target = check_output(path, suffixes=(".toml",), overwrite=overwrite)
+    target = check_stance_output(path, overwrite=overwrite)
     data = stance_data(
         stance,
         target.resolve().parent,
