@@ -93,6 +93,9 @@ from copsense.files import load_configurations
         ("sweep icub --com-y 0:0.01:2 --output absent/icub.nc", "Create it first"),
         ("sweep icub --com-y 0:0.01:2 --output icub.txt", "Choose .nc or .csv"),
         ("plot absent.nc", "copsense sweep"),
+        ("analyze icub", "no command named 'analyze'. Did you mean analyse?"),
+        ("walk", "copsense --help says"),
+        ("optimize icub", "Did you mean optimise?"),
     ],
 )
 def test_bad_input_is_one_line_that_names_it(arguments, said, tmp_path, monkeypatch):
@@ -126,7 +129,6 @@ def test_an_empty_text_is_not_taken_for_an_option_left_out(arguments):
 @pytest.mark.parametrize(
     "arguments",
     [
-        "walk",
         "robots --fast",
         "analyse",
         "analyse icub --com-y left",

@@ -327,3 +327,45 @@ def test_loads_of_a_file_stay_beside_those_of_the_shell(plain, tmp_path):
     stance_of(plain, *FEET, *BENT, "--load", "trunk=0:0:-9", "--save-stance", file)
     both = stance_of("--stance", file, "--load", "l_shin=1:0:0")
     assert [load.frame for load in both.loads] == ["trunk", "l_shin"]
+
+
+def test_a_stance_file_goes_where_a_robots_name_goes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = "t.toml"
+    words = ("--com-y", "0.01", "--limits", "friction=0.5", "--criterion", "minimum-wrench")
+    once = copsense("analyse", "four_bar", *words, "--save-stance", file, "--json")
+    again = copsense("analyse", file, "--json")
+    check_alike(once.json, again.json, 1e-9)
+    assert f"note: limits from {file}: friction=0.5." in again.err  # never in silence
+    assert "limits from" not in copsense("analyse", file, "--limits", "friction=0.3").err
+    assert list(copsense("analyse", file, "--json").json["criteria"]) == ["minimum-wrench"]
+    assert "no limit active" in copsense("sweep", file, "--com-y", "0:1mm:2").out
+    inspected = copsense("inspect", file)
+    assert inspected.out.endswith(f"to analyse it:\n  copsense analyse {file}\n")
+    assert "says what its robot is" in copsense("inspect", file, "--contact", "l_sole").error
+    for command in ("log", "identify"):
+        assert "no log at 'x.csv'" in copsense(command, "x.csv", "--stance", file).error
+    assert library.load_robot(file).joint_names == library.load_robot("four_bar").joint_names
+
+
+def test_what_stands_beside_a_stance_file_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    library.robots.save_stance(library.load_stance("four_bar"), "t.toml")
+    for words, said in (
+        (("analyse", "icub", "--stance", "t.toml", "--width", "1"), "ROBOT (icub) and --width."),
+        (("analyse", "t.toml", "--soles", "visual"), "so does --soles."),
+        (("push", "--stance", "t.toml", "--passive", "x", "--lock", "y"), "--lock and --passive."),
+        (("analyse", "t.toml", "--stance", "t.toml"), "both say which robot"),
+        (("benchmark", "t.toml", "--stance", "t.toml"), "both say which robot"),
+    ):
+        assert said in copsense(*words).error
+
+
+def test_a_stance_file_that_was_moved_says_where_it_looked(tmp_path, plain):
+    file, moved = plain.parent / "t.toml", tmp_path / "t.toml"
+    assert copsense("analyse", plain, *FEET, *BENT, "--save-stance", file).code == 0
+    moved.write_text(file.read_text("utf-8"), "utf-8")
+    error = copsense("analyse", moved).error
+    assert f"no robot at 'plain.urdf', seen from the folder {tmp_path}." in error
+    moved.write_text('robot = "other.toml"', "utf-8")
+    assert "names another one, other.toml" in copsense("analyse", moved).error

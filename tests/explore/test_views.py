@@ -143,6 +143,10 @@ def test_a_stance_of_many_words_goes_through_a_file(tmp_path, monkeypatch):
     exec(lines.replace("print(analysis)", ""), here)
     assert here["analysis"].stance.contact_names == ("l_sole",)
     assert here["analysis"].stance.com[2] == pytest.approx(0.52, abs=1e-12)
+    for words in (("stance.toml",), ("--stance", "stance.toml")):  # with its criteria and limits
+        lines = State(words, {}).to_python()
+        assert "file = StanceFile.read('stance.toml')" in lines
+        assert "written by" not in lines
 
 
 names = some.sampled_from(["com_x", "l_knee", "a joint's name", "l_sole:yaw"])

@@ -62,6 +62,11 @@ def test_what_limits_hold_on_the_edge_tips_there(icub):
     bare = predict_lean(icub, C1, 0.05)
     assert found.excursion == pytest.approx(bare.excursion, abs=1e-7)
     assert found.contact == bare.contact
+    where = f"at {found.excursion * 1e3:.1f} mm"
+    assert found.statement == (
+        f"CoP of {found.contact} reaches an edge {where}, and the limits hold it there"
+    )
+    assert bare.statement == f"{bare.contact} tips {where}"
 
 
 def test_margins_and_torques_are_those_of_the_postures(icub):

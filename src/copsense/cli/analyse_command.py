@@ -73,9 +73,9 @@ def analyse(
 ) -> None:
     """Analyse one posture of ROBOT: centre of pressure, margin and sensitivity of each contact.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Lengths in the
-    answer are along the contact's axes: x forward, y left, z the normal. In Python:
-    copsense.analyse.
+    ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
+    (.toml). Lengths in the answer are along the contact's axes: x forward, y left, z the normal. In
+    Python: copsense.analyse.
     """
     from copsense.analysis import analyse as analyse_stance
     from copsense.files import check_output

@@ -282,7 +282,7 @@ def _print(recording: Recording) -> None:
     click.echo(f"  torque norm {recording.torque_norm:.1f} Nm, peak {recording.torque_peak:.1f} Nm")
     if tip:
         click.echo(
-            f"  first tip at {tip.time:.2f} s, CoM y {recording.tip_travel * 1e3:+.1f} mm "
+            f"  first {tip.kind} at {tip.time:.2f} s, CoM y {recording.tip_travel * 1e3:+.1f} mm "
             f"from the start: {tip.message}"
         )
     else:

@@ -19,7 +19,7 @@ from copsense.cli.option_lists import F, SectionedCommand
 from copsense.cli.place_options import place_options
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
 from copsense.cli.robot_argument import robot_argument
-from copsense.cli.stance_memory import remembered_stance
+from copsense.cli.stance_memory import remember_file, remembered_stance
 from copsense.cli.stance_options import read_stance, standing_options
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError
@@ -114,6 +114,7 @@ def benchmark(
     from copsense.comparison import benchmark_summary, read_plan, run_benchmark
     from copsense.comparison.benchmark_run import check_plan, finished_scores
     from copsense.files import check_output
+    from copsense.robots.stance_tables import is_stance_file
 
     require("mujoco", "a benchmark in closed loop")
     # A table that is resumed has its picture drawn again.
@@ -121,10 +122,13 @@ def benchmark(
     if picture is not None:
         check_output(picture, suffixes=PICTURES, overwrite=redraw)
     if plan_file is None:
+        if len(robots) == 1 and is_stance_file(robots[0]):
+            remember_file(robots[0])
+            robots = ()
         file = remembered_stance()
         if file is not None and robots:
             raise InvalidInputError(
-                f"--stance {file.path} says which robot stands where, and so does "
+                f"the stance file {file.path} says which robot stands where, and so does "
                 f"{', '.join(robots)}. Give one of them."
             )
         plan = _plan(robots or (str(file.path) if file else "icub",), **options)
@@ -320,6 +324,7 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
         The robots' notes, which are printed.
     """
     from copsense.robots import PRESETS, load_robot, load_stance
+    from copsense.robots.stance_tables import is_stance_file
 
     asked = (
         (c.robot.source, (*c.robot.contacts, *(c.robot.soles or ())))
@@ -328,7 +333,7 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     )
     notes: list[str] = []
     for source, frames in dict.fromkeys(asked):
-        if source.endswith(".toml"):
+        if is_stance_file(source):
             stance = load_stance(source)
             notes += [f"{stance.robot.name}: {note}" for note in stance.robot.notes]
         elif source not in PRESETS or frames:

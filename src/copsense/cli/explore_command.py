@@ -94,10 +94,10 @@ def explore(
 ) -> None:
     """Show ROBOT in the browser, with sliders for its posture, criteria and limits.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. What is shown has
-    the numbers of `copsense analyse`; "copy command" gives the line that prints them. Only this
-    machine can connect, and only by the whole address that is printed. Ctrl-C ends it. In Python:
-    copsense.explore.
+    ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
+    (.toml). What is shown has the numbers of `copsense analyse`; "copy command" gives the line that
+    prints them. Only this machine can connect, and only by the whole address that is printed.
+    Ctrl-C ends it. In Python: copsense.explore.
     """
     from copsense.extras import require
     from copsense.files import check_output

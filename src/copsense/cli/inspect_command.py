@@ -51,15 +51,17 @@ def inspect(
 ) -> None:
     """Inspect ROBOT: mass, joints, motors, feet and soles, and the `analyse` line to paste.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Feet are found by
-    geometry, what reaches lowest at rest, unless --contact names them. The line has been tried: the
-    robot stands by it. It repeats the options of contacts and drives that are given here. In
-    Python: copsense.robots.inspect_robot.
+    ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
+    (.toml). Feet are found by geometry, what reaches lowest at rest, unless --contact names them.
+    The line has been tried: the robot stands by it. It repeats the options of contacts and drives
+    that are given here. In Python: copsense.robots.inspect_robot.
     """
     from copsense.robots import PRESETS, inspect_robot, load_robot
+    from copsense.robots.stance_tables import is_stance_file
 
+    whole = robot in PRESETS or is_stance_file(robot)  # its contacts come along
     given = _given({"contacts", "contact_at", "soles", "level_soles", "sole_height", *touching})
-    if given and not contacts and robot not in PRESETS:
+    if given and not contacts and not whole:
         raise InvalidInputError(
             f"{given[0].partition('=')[0]} says something of contacts, and which they are is not "
             "said. Name them too, --contact FRAME, or leave it out, and they are looked for."
@@ -72,7 +74,7 @@ def inspect(
     if given:
         own = read_contacts(robot, contacts, model.frame_names, sole_height=sole_height, **touching)
     found = inspect_robot(
-        robot if robot in PRESETS else model,  # read once
+        robot if whole else model,  # read once
         package_dirs=package_dirs,
         root=root,
         contacts=own,

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import click
 
+from copsense.errors import UnknownNameError
+
 
 class Place(NamedTuple):
     """Where a command is defined, and its line in the group's help."""
@@ -36,6 +38,21 @@ class LazyGroup(click.Group):
             return None
         command: click.Command = getattr(importlib.import_module(place.module), place.name)
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that the arguments name.
+
+        Raises:
+            UnknownNameError: there is none of that name; the message has the nearest ones.
+        """
+        name = str(args[0])
+        if not ctx.resilient_parsing and name not in self.places and not name.startswith("-"):
+            raise UnknownNameError(
+                "command", name, self.places, "copsense --help says what each does."
+            )
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with their summaries, without importing them."""

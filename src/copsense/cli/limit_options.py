@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from copsense.cli.option_lists import SHARING, F, with_options
+from copsense.cli.printing import echo_notes
 from copsense.cli.stance_memory import remembered_stance
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -49,7 +51,10 @@ def read_limits(text: str | None) -> Limits | None:
 
     if text is None:
         file = remembered_stance()
-        return None if file is None else file.limits
+        kept = None if file is None else file.limits
+        if file is not None and kept is not None:
+            echo_notes([f"limits from {file.path}: {_said(kept)}."])
+        return kept
     values: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
         name, _, value = part.partition("=")
@@ -64,6 +69,20 @@ def read_limits(text: str | None) -> Limits | None:
             raise InvalidInputError(f"the limit {name} is given twice. Give it once.")
         values[LIMIT_NAMES[name]] = _limit_value(name, value)
     return Limits(**values)
+
+
+def _said(limits: Limits) -> str:
+    """Limits in the words of ``--limits``: those that are not the usual ones."""
+    from copsense.limits import LIMIT_NAMES, Limits
+
+    usual, parts = Limits(), []
+    for word, name in LIMIT_NAMES.items():
+        value = getattr(limits, name)
+        if isinstance(value, Mapping):
+            parts += [f"{word} of {of} {each}" for of, each in value.items()]
+        elif value != getattr(usual, name):
+            parts.append(f"{word}={'off' if value is None else value}")
+    return ", ".join(parts) or "the usual ones (contacts push, and keep their own friction)"
 
 
 def _limit_value(name: str, value: str) -> float | int | str | None:

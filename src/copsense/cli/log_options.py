@@ -9,6 +9,7 @@ import click
 
 from copsense.cli.option_lists import F, package_dirs_option, with_options
 from copsense.cli.printing import progress_bar
+from copsense.cli.stance_memory import remember_robot
 from copsense.cli.units import read_quantity
 
 if TYPE_CHECKING:
@@ -17,11 +18,21 @@ if TYPE_CHECKING:
     from copsense.logs.log import Log
     from copsense.robot import Robot
 
+
+def _remember(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """The criteria of a stance file are those of the command."""
+    remember_robot(context, parameter, value)
+    return value
+
+
 _OPTIONS = (
     click.argument("file", type=click.Path()),
     click.option(
         "--robot",
+        "--stance",
+        "robot",
         required=True,
+        callback=_remember,
         help="Whose log it is: a preset, a URDF, MJCF or SDF file, or a stance file (.toml).",
     ),
     click.option(

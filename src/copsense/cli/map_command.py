@@ -122,10 +122,10 @@ def map_command(
 ) -> None:
     """Map the sensitivity of ROBOT over a space of postures, contacts in place.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. Evaluates a grid or
-    a sample chunk by chunk into a Zarr store (xarray.open_zarr opens it); the same command resumes
-    a map that was stopped. A posture that cannot be reached or evaluated is a row with its reason,
-    and makes the exit code 1.
+    ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
+    (.toml). Evaluates a grid or a sample chunk by chunk into a Zarr store (xarray.open_zarr opens
+    it); the same command resumes a map that was stopped. A posture that cannot be reached or
+    evaluated is a row with its reason, and makes the exit code 1.
     """
     require("zarr", "a map's store")  # its extra brings what else a map needs
 

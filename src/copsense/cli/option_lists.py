@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -56,6 +56,12 @@ def with_options(
         for param in set(getattr(command, "__click_params__", ())) - before:
             _section_of.setdefault(param, section)
     return command
+
+
+def options_named(names: Iterable[str]) -> list[str]:
+    """The options of the command that runs, as they are typed, by the names of their parameters."""
+    typed = {param.name: param.opts[0] for param in click.get_current_context().command.params}
+    return [typed[name] for name in names if name in typed]
 
 
 def package_dirs_option(command: F) -> F:

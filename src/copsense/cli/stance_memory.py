@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from copsense.errors import InvalidInputError
+
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
     from copsense.robots import StanceFile
@@ -21,10 +23,38 @@ def remember_stance(
 ) -> str | None:
     """Read ``--stance FILE`` before the other options are looked at."""
     if value is not None:
-        from copsense.robots import StanceFile
-
-        context.meta[_KEY] = StanceFile.read(value)
+        remember_file(value)
     return value
+
+
+def remember_robot(
+    context: click.Context, parameter: click.Parameter, value: str | None
+) -> str | None:
+    """A ROBOT that is a stance file is read as ``--stance`` is, and named no more."""
+    if value is None:
+        return None
+    from copsense.robots.stance_tables import is_stance_file
+
+    if not is_stance_file(value):
+        return value
+    remember_file(value)
+    return None
+
+
+def remember_file(path: str | Path) -> None:
+    """Read the stance file of the command that runs.
+
+    Raises:
+        InvalidInputError: it has one already.
+    """
+    from copsense.robots import StanceFile
+
+    meta = click.get_current_context().meta
+    if _KEY in meta:
+        raise InvalidInputError(
+            f"{meta[_KEY].path} and {path} both say which robot stands where. Give one of them."
+        )
+    meta[_KEY] = StanceFile.read(path)
 
 
 def remembered_stance() -> StanceFile | None:

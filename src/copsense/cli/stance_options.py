@@ -12,16 +12,32 @@ from copsense.cli.contact_options import contact_options, possible_frames, read_
 from copsense.cli.drive_options import drive_options, read_drives
 from copsense.cli.limit_options import limits_option
 from copsense.cli.load_options import load_options, put_loads
-from copsense.cli.option_lists import POSTURE, STANCE_FILE, F, package_dirs_option, with_options
+from copsense.cli.option_lists import (
+    POSTURE,
+    STANCE_FILE,
+    F,
+    options_named,
+    package_dirs_option,
+    with_options,
+)
 from copsense.cli.place_options import course_options, place_options, put_in_place
 from copsense.cli.printing import echo_notes
 from copsense.cli.robot_argument import robot_argument
-from copsense.cli.stance_memory import remember_stance, remembered_stance, written
+from copsense.cli.stance_memory import (
+    remember_robot,
+    remember_stance,
+    remembered_stance,
+    written,
+)
 from copsense.cli.units import ANGLE, LENGTH, read_positions, read_quantity
 from copsense.errors import InvalidInputError
+from copsense.listing import listed
 
 if TYPE_CHECKING:
     from copsense.stance import Stance
+
+
+_ROBOT = robot_argument(required=False, is_eager=True, callback=remember_robot)
 
 
 def stance_options(command: F, *, coordinates: bool = True) -> F:
@@ -32,12 +48,12 @@ def stance_options(command: F, *, coordinates: bool = True) -> F:
         coordinates: whether it takes ``--at`` of `place_options`.
     """
     placed = place_options(command, coordinates=coordinates)
-    return robot_argument(required=False)(standing_options(placed))
+    return _ROBOT(standing_options(placed))
 
 
 def swept_stance_options(command: F) -> F:
     """The same for a command that sweeps the CoM or a joint: a value holds, a range sweeps."""
-    return robot_argument(required=False)(standing_options(course_options(command)))
+    return _ROBOT(standing_options(course_options(command)))
 
 
 _POSTURE = click.option(
@@ -64,7 +80,7 @@ def standing_options(command: F, posture: Callable[[Any], Any] | None = None) ->
             expose_value=False,
             is_eager=True,
             callback=remember_stance,
-            help="A stance file (.toml) instead of ROBOT: robot, contacts, configuration, loads "
+            help="A stance file (.toml) as ROBOT: robot, contacts, configuration, loads "
             "and drives, and the limits and criteria to use unless options give others.",
         ),
         click.option(
@@ -152,22 +168,41 @@ def read_stance(
 
     file = remembered_stance()
     if file is not None:
-        touching = (contacts, contact_at, level_soles, sole, sole_height, offsets, turns, grounds)
-        standing = (package_dirs, posture, base_yaw, base_rpy, width, locked)
-        if robot is not None or any(
-            value not in (None, (), False)
-            for value in (*touching, planes, frictions, *standing, *drives.values())
-        ):
+        standing = {
+            "contacts": contacts,
+            "contact_at": contact_at,
+            "soles": None if soles == "collision" else soles,
+            "level_soles": level_soles,
+            "sole": sole,
+            "sole_height": sole_height,
+            "offsets": offsets,
+            "turns": turns,
+            "grounds": grounds,
+            "planes": planes,
+            "frictions": frictions,
+            "package_dirs": package_dirs,
+            "posture": posture,
+            "base_yaw": base_yaw,
+            "base_rpy": base_rpy,
+            "width": width,
+            "locked": locked,
+            **drives,
+        }
+        beside = [] if robot is None else [f"ROBOT ({robot})"]
+        beside += options_named(
+            name for name, value in standing.items() if value not in (None, (), False)
+        )
+        if beside:
             raise InvalidInputError(
-                f"--stance {file.path} says which robot stands where, and so does ROBOT or another "
-                "option. Give one of them."
+                f"the stance file {file.path} says which robot stands where, and so does "
+                f"{listed(beside)}. Leave the file or the rest out."
             )
         stance = file.stance()
         echo_notes(stance.robot.notes)
         return finished(stance, file.source, file.package_dirs)
     if robot is None:
         raise click.UsageError(
-            "no robot is named. Give ROBOT (a preset, or a URDF, MJCF or SDF file), or "
+            "no robot is named. Give ROBOT (a preset, or a URDF, MJCF, SDF or stance file), or "
             "--stance FILE.",
             click.get_current_context(silent=True),
         )

@@ -77,8 +77,8 @@ def sweep(
 ) -> None:
     """Sweep the CoM or a joint of ROBOT, contacts in place, and evaluate every posture.
 
-    ROBOT is a name from `copsense robots`, or the path of a URDF, MJCF or SDF. A posture that fails
-    is a row with its reason, and makes the exit code 1.
+    ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
+    (.toml). A posture that fails is a row with its reason, and makes the exit code 1.
     """
     from copsense.files import check_output
     from copsense.sweeps import sweep as evaluate

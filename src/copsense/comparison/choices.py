@@ -16,6 +16,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.robot import Robot
 from copsense.robots import PRESETS, StanceFile, load_robot, load_stance
+from copsense.robots.stance_tables import is_stance_file
 from copsense.simulation import Scenario
 from copsense.stance import Stance
 
@@ -90,7 +91,7 @@ class RobotChoice:
     @property
     def is_stance(self) -> bool:
         """Whether a stance file says, or its tables, how the robot stands."""
-        return self.source.endswith(".toml") or self.tables is not None
+        return is_stance_file(self.source) or self.tables is not None
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -98,7 +99,7 @@ class RobotChoice:
         if self.source in PRESETS or not Path(self.source).is_file():
             return ()
         own = Path(self.source)
-        model = StanceFile.read(own).source if own.suffix == ".toml" else ""
+        model = StanceFile.read(own).source if is_stance_file(own) else ""
         return (own, model) if isinstance(model, Path) and model.is_file() else (own,)
 
     def check_own(self, posture: PostureChoice) -> None:

@@ -15,6 +15,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import LIMIT_NAMES, Limits
 from copsense.loads import Load
 from copsense.path import COM_COORDINATES
+from copsense.robots.stance_tables import is_stance_file
 
 _OWN: Literal["own"] = "own"
 
@@ -139,13 +140,13 @@ class State:
             posture: what is analysed. In both ``{stance}`` stands for the stance.
         """
         lines, words = ["import copsense"], self.words
-        if len(words) == 1:
+        if len(words) == 1 and not is_stance_file(words[0]):
             stance = f"copsense.load_stance({words[0]!r})"
             criteria, limits = "None", "None"
         else:
             lines += ["from copsense.robots import StanceFile"]
-            if len(words) == 2 and words[0] == "--stance":
-                path = words[1]
+            if len(words) == 1 or (len(words) == 2 and words[0] == "--stance"):
+                path = words[-1]
             else:
                 path = "stance.toml"
                 save = shlex.join(["copsense", "analyse", *words, "--save-stance", path])

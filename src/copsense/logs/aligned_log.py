@@ -41,6 +41,7 @@ from copsense.logs.sway_fit import LEAST, STILL, find_sway
 from copsense.posture_run import PostureRun
 from copsense.robot import Robot
 from copsense.robots import PRESETS, load_robot, load_stance
+from copsense.robots.stance_tables import is_stance_file
 from copsense.stance import Stance
 
 POSTURES = 5000  # that are evaluated at most
@@ -159,7 +160,7 @@ def log_robot(
     Raises:
         CopsenseError: as `load_robot` and `load_stance`.
     """
-    if isinstance(source, str) and (source in PRESETS or source.endswith(".toml")):
+    if is_stance_file(source) or (isinstance(source, str) and source in PRESETS):
         source = load_stance(source)
     if isinstance(source, Stance):
         return source.robot, tuple(source.contacts)

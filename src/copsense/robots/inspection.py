@@ -14,6 +14,7 @@ from jaxtyping import Float
 from copsense.contact import Contact
 from copsense.content import ShortRepr
 from copsense.drives import Drives
+from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
 from copsense.listing import listed
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
@@ -22,6 +23,7 @@ from copsense.robots.contact_soles import ContactAt, tip_text
 from copsense.robots.feet import Foot, faced_feet, find_feet
 from copsense.robots.heading import bent_knees, facing, straight_legs, upright_base
 from copsense.robots.presets import PRESETS
+from copsense.robots.stance_tables import is_stance_file
 from copsense.robots.standing import load_robot, rest_positions
 from copsense.shapes import Geometry
 from copsense.sole import tilt_text
@@ -169,7 +171,8 @@ def inspect_robot(
     """Inspect a robot: its joints and motors, the feet found by geometry, and how it stands.
 
     Args:
-        source: a preset's name, the path of a URDF, MJCF or SDF, or a `Robot`.
+        source: a preset's name, the path of a URDF, MJCF or SDF, a stance file (.toml), whose
+            stance the line analyses, or a `Robot`.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         root: body of the robot that is meant, where an MJCF holds several.
         contacts: what it is to stand on, instead of the feet found by geometry.
@@ -186,6 +189,11 @@ def inspect_robot(
     """
     folders = tuple(map(str, package_dirs))
     own = tuple(contacts or ())
+    if is_stance_file(source) and (folders or own or given or locked or drives or root):
+        raise InvalidInputError(
+            f"the stance file {source} says what its robot is and how it stands. Leave contacts, "
+            "drives, locked joints, folders and root (and the options of these) out."
+        )
     robot = load_robot(
         source,
         package_dirs=folders,
@@ -225,7 +233,7 @@ def inspect_robot(
         own=own,
         level_soles=level_soles,
     )
-    if named in PRESETS:
+    if named in PRESETS or is_stance_file(source):
         start = replace(start, soles=soles)  # its contacts are known
         found: AnalyseLine | None = start
         reason = ""

@@ -23,7 +23,7 @@ import tomli_w
 from copsense.arrays import check_keys, finite_array, finite_number
 from copsense.drives import Drives
 from copsense.errors import CopsenseError, InvalidInputError, ModelLoadError
-from copsense.files import check_output, read_toml, write_beside
+from copsense.files import check_output, file_at, read_toml, write_beside
 from copsense.loads import Load, SpringLoad
 from copsense.robot import Robot
 from copsense.robots.presets import PRESETS
@@ -32,6 +32,7 @@ from copsense.robots.stance_tables import (
     configuration_data,
     contact_data,
     drives_data,
+    is_stance_file,
     list_of,
     load_data,
     read_configuration,
@@ -115,6 +116,11 @@ class StanceFile:
                 f'the stance file {where} names no robot. Write, say, robot = "icub", or the path '
                 "of a URDF, MJCF or SDF from the file's own folder."
             )
+        if is_stance_file(data["robot"]):
+            raise InvalidInputError(
+                f"the stance file {where} names another one, {data['robot']}, as its robot. Name a "
+                "preset, or the path of a URDF, MJCF or SDF from the file's own folder."
+            )
         return cls(where, data)
 
     @property
@@ -155,10 +161,24 @@ class StanceFile:
             CopsenseError: anything wrong with what the file says; the message names the file.
         """
         try:
+            self._check_source()
             return self._stance()
         except CopsenseError as error:
             error.add_note(f"The stance file is {self.path}.")
             raise
+
+    def _check_source(self) -> None:
+        """Reject a model that is not where the file says; it may have been moved without it.
+
+        Raises:
+            ModelLoadError: there is no such file.
+        """
+        robot, folder = str(self.data["robot"]), self.path.resolve().parent
+        if robot not in PRESETS and not file_at(folder / robot):
+            raise ModelLoadError(
+                f"there is no robot at {robot!r}, seen from the folder {folder}. Move the stance "
+                "file back to where it was written, or say in its line robot where that is."
+            )
 
     def _stance(self) -> Stance:
         from copsense.batch import PostureChart, chart_posture

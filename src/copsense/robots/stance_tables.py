@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, TypeGuard
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +17,11 @@ from copsense.errors import InvalidInputError
 from copsense.loads import Load, SpringLoad
 from copsense.robot import Robot
 from copsense.stance import Stance
+
+
+def is_stance_file(source: object) -> TypeGuard[str | Path]:
+    """Whether what is given for a robot is the path of a stance file, by its ending."""
+    return isinstance(source, str | Path) and str(source).endswith(".toml")
 
 
 def configuration_data(stance: Stance) -> dict[str, Any]:

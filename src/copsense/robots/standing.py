@@ -39,6 +39,7 @@ from copsense.robots.plausibility import (
 )
 from copsense.robots.presets import PRESETS, preset_robot
 from copsense.robots.rigid_points import keep_distances
+from copsense.robots.stance_tables import is_stance_file
 from copsense.robots.uprighting import base_turn, upright_contacts
 from copsense.shapes import Geometry
 from copsense.stance import Stance, check_support
@@ -65,7 +66,8 @@ def load_robot(
     """A robot from a preset's name, a URDF, MJCF or SDF (path or text), or a ``pin.Model``.
 
     Args:
-        source: what to load; a `Robot` is returned as it is.
+        source: what to load, or a stance file (.toml), whose robot it is, with its drives and
+            payloads; a `Robot` is returned as it is.
         package_dirs: folders that hold the packages of ``package://`` meshes.
         frames: frames of the robot, such as its contacts: where an MJCF holds several things, the
             tree that holds them is the robot.
@@ -101,6 +103,8 @@ def _read(
         return source
     if isinstance(source, pin.Model):
         return Robot.from_model(source)
+    if is_stance_file(source):
+        return _read_stance(source).robot
     if str(source) in PRESETS:
         return preset_robot(PRESETS[str(source)])
     text = str(source)
@@ -114,6 +118,13 @@ def _read(
     return Robot.from_description(
         load_description(source, None, package_dirs, frames=frames, root=root)
     )
+
+
+def _read_stance(path: str | Path) -> Stance:
+    """What a stance file says, whose module stands on this one."""
+    from copsense.robots.stance_file import StanceFile
+
+    return StanceFile.read(path).stance()
 
 
 def load_stance(
@@ -166,16 +177,14 @@ def load_stance(
         raise UnknownNameError("place of a contact", contact_at, get_args(ContactAt))
     if soles not in get_args(Geometry):
         raise UnknownNameError("geometry of soles", soles, get_args(Geometry))
-    if isinstance(source, str | Path) and str(source).endswith(".toml"):
+    if is_stance_file(source):
         given = (contacts, posture, base_rpy, width, contact_at, drives)
         if level_soles or passive or locked or any(value is not None for value in given):
             raise InvalidInputError(
                 f"the stance file {source} says how the robot stands, and so does another "
                 "argument. Change the file, or leave the argument out."
             )
-        from copsense.robots.stance_file import StanceFile
-
-        return StanceFile.read(source).stance()
+        return _read_stance(source)
     preset = PRESETS.get(str(source)) if isinstance(source, str | Path) else None
     robot = load_robot(
         source,

@@ -68,6 +68,8 @@ class StaticPrediction(ShortRepr):
         levers: at the start, what a sway does to each output of the statics.
         in_motion: the same with inertia, of a sine; None for another signal.
         at_rest: what cannot be held at the start already, and the remedy; "" where all can.
+        held: whether the limits hold the contact where it would tip or lift: its CoP goes on along
+            the edge, or its force stays at nothing.
     """
 
     values: Float[np.ndarray, " N"]
@@ -86,6 +88,7 @@ class StaticPrediction(ShortRepr):
     levers: tuple[SwayLever, ...] = ()
     in_motion: TimedPrediction | None = None
     at_rest: str = ""
+    held: bool = False
 
     def __post_init__(self) -> None:
         """Own the arrays."""
@@ -96,7 +99,13 @@ class StaticPrediction(ShortRepr):
         """What is predicted, in words; also where the path ends before anything happens."""
         if not np.isfinite(self.excursion):
             return f"no contact tips up to {self.reach * 1e3:.1f} mm"
-        return f"{self.contact} {self.how} at {self.excursion * 1e3:.1f} mm"
+        where = f"at {self.excursion * 1e3:.1f} mm"
+        if self.held:
+            what = f"CoP of {self.contact} reaches an edge"
+            if self.how == "lifts":
+                what = f"{self.contact} is unloaded"
+            return f"{what} {where}, and the limits hold it there"
+        return f"{self.contact} {self.how} {where}"
 
     def smallest_margin(self, low: float, high: float) -> tuple[float, float]:
         """Smallest margin for the coordinate between two values [m].
@@ -241,6 +250,7 @@ def predict(
             cops[i], torques[i] = cops_or_nan(point.equilibrium), point.torques
             margins[i] = gaps.margin(point)
     joints = np.array([start.stance.robot.joint_positions(s.q) for s in path.stances])
+    how = "" if found is None else _HOW[gaps.kinds[found.row]]
     return StaticPrediction(
         values,
         cops,
@@ -250,7 +260,7 @@ def predict(
         joints,
         np.inf if found is None else found.travel,
         "" if found is None else gaps.contacts[found.row],
-        "" if found is None else _HOW[gaps.kinds[found.row]],
+        how,
         float(first.min(initial=np.inf)),
         float(max(side * values.max() if side > 0 else -values.min(), 0.0)),
         start,
@@ -258,7 +268,16 @@ def predict(
         sway_levers(start.equilibrium, start.tangent),
         predict_in_motion(reference, criterion, limits),
         at_rest_note(start.equilibrium, criterion, gaps.friction),
+        _holds(limits, how),
     )
+
+
+def _holds(limits: Limits | None, how: str) -> bool:
+    """Whether limits keep a contact from what it would do: the ground's own friction is not one."""
+    if limits is None:
+        return False
+    held = {"tips": limits.cop_margin, "lifts": limits.normal_force}
+    return held.get(how) is not None
 
 
 def predict_lean(

@@ -242,8 +242,8 @@ class Recording(LabelledResult):
             lines.append(f"  likely cause: {self.attrs['likely_cause']}")
         if tip is not None:
             lines.append(
-                f"  first tip at {tip.time:.2f} s, CoM y {self.tip_travel * 1e3:+.1f} mm from the "
-                f"start: {tip.message}"
+                f"  first {tip.kind} at {tip.time:.2f} s, CoM y {self.tip_travel * 1e3:+.1f} mm "
+                f"from the start: {tip.message}"
             )
         lines.append(
             f"  CoM y error {self.tracking_error * 1e3:.3f} mm rms, "
