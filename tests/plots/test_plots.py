@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import combinations
 
 import matplotlib as mpl
 import numpy as np
@@ -264,8 +265,11 @@ def test_a_stance_shows_where_each_cop_would_go(icub):
 def test_a_quadrupeds_stance_says_when_a_foot_unloads(stance_of):
     stance = stance_of("solo12")
     figure = rendered(plots.plot_stance(stance, [copsense.cop_sensitivity(stance, CRITERIA[1])]))
-    words = [text.get_text() for text in figure.axes[-1].texts]
-    assert sum("unloads after" in text for text in words) == 4
+    said = [text for text in figure.axes[-1].texts if "unloads after" in text.get_text()]
+    assert len(said) == 4
+    boxes = [text.get_window_extent() for text in said]
+    assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+    assert not any("forward" in text.get_text() for text in figure.legends[0].get_texts())
 
 
 def test_a_stance_needs_sensitivities_of_its_own(icub, stance_of):

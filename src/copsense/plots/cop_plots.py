@@ -31,6 +31,8 @@ from copsense.plots.style import (
 )
 from copsense.sweeps import Sweep
 
+_OVER_LINE = 6.0  # points between the line of a contact without a sole and its name
+
 
 @styled
 def plot_cop(
@@ -131,22 +133,24 @@ def plot_foot_cop(
 
 def _draw_edges(ax: Axes, sweep: Sweep, axis: str, contacts: Sequence[str]) -> None:
     """Each sole as a band between its edges; a contact without one as its name alone."""
-    at: dict[float, list[str]] = {}
+    at: dict[tuple[float, float], list[str]] = {}
     for k, found in enumerate(edges(sweep, axis)):
         if found is None:
-            middle = float(contact_origins(sweep)[k, "xy".index(axis)])
+            middle, over = float(contact_origins(sweep)[k, "xy".index(axis)]), _OVER_LINE
         else:
             ax.axhspan(*found, color=SOLE, zorder=0.5, linewidth=0)
             for edge in found:
                 ax.axhline(edge, color=MUTED, linewidth=1.0, zorder=0.6)
-            middle = found[0] + 3.0  # just inside the lower edge, where the curves seldom are
-        at.setdefault(round(middle, 1), []).append(contacts[k])
-    for middle, here in at.items():
-        ax.text(
-            0.012,
-            middle,
+            # just inside the lower edge, where the curves seldom are
+            middle, over = found[0] + 3.0, 0.0
+        at.setdefault((round(middle, 1), over), []).append(contacts[k])
+    for (middle, over), here in at.items():
+        ax.annotate(
             ", ".join(here),
-            transform=ax.get_yaxis_transform(),
+            (0.012, middle),
+            xytext=(0.0, over),
+            xycoords=ax.get_yaxis_transform(),
+            textcoords="offset points",
             color=MUTED,
             fontsize=8.5,
             va="bottom",
@@ -164,4 +168,5 @@ def _limit(ax: Axes, sweep: Sweep, axis: str, cops: np.ndarray, com: np.ndarray)
     shown = cops[np.isfinite(cops)]
     inside = shown[(shown > marks.min() - span / 2) & (shown < marks.max() + span / 2)]
     everything = np.concatenate([marks, inside])
-    ax.set_ylim(everything.min() - 0.05 * span, everything.max() + 0.05 * span)
+    names = 0.15 if any(e is None for e in edges(sweep, axis)) else 0.05  # room for one on top
+    ax.set_ylim(everything.min() - 0.05 * span, everything.max() + names * span)

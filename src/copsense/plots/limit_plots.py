@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle, pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
@@ -38,6 +40,7 @@ from copsense.sweeps import Sweep
 
 _AT_LIMIT = 1e-9  # m, N or N m: a limit this near to its bound is active
 _KIND_TITLES = {"cop": "CoP to the edge", "torque": "joint torque"}
+_PATH: dict[str, Any] = {"color": INK, "linewidth": 1.0, "linestyle": (0, (2, 1.5))}
 _DEGENERATE = 3  # vertices: a region with fewer has no area
 
 
@@ -134,11 +137,15 @@ def plot_regions(
             ax.plot(outline[:, 1], outline[:, 0], color=shade, linewidth=width, zorder=3)
     way = sweep["com"].values[:, :2] * MM
     ax.plot(way[:, 1], way[:, 0], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), zorder=4)
+    path = Line2D(
+        [], [], color=INK, linewidth=1.0, linestyle=(0, (2, 1.5)), label="path of the CoM"
+    )
     if com is not None:
         x, y = np.asarray(com, dtype=float) * MM
         ax.plot(y, x, "+", color=INK, markersize=13, markeredgewidth=2, zorder=5)
     frame_ground(ax, world_soles(sweep), contact_origins(sweep), np.vstack(corners))
-    add_legend(ax, shown)
+    ax.set_title("where the CoM may be, contacts and joints held")
+    add_legend(ax, shown, extra=[path])
     return ax
 
 

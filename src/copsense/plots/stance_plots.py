@@ -34,7 +34,8 @@ from copsense.uncertainty import Spread
 
 _STEP = 20.0  # mm that the CoM moves for the arrows
 _FLATTEST = 0.6  # height of what is drawn from above, by its width
-_NARROW, _NARROWEST = 0.5, 0.9  # of points, width by length; and of what is drawn of them
+_NARROW, _NARROWEST = 0.8, 0.9  # of points, width by length; and of what is drawn of them
+_SHORTEST = 0.5  # mm: a shorter arrow is all head
 _UNSEEN = 0.1  # mm: smaller is nothing to see
 _WORST: dict[str, Any] = {"linewidth": 1.0, "linestyle": (0, (4, 2))}
 _FORWARD, _LEFT = "#009E73", "#CC79A7"
@@ -93,7 +94,9 @@ def plot_stance(
     look = looks(names, color, label)
     colour = look.colour
     if axes is None:
-        figure, panels = _with_robot(stance, sensitivities, colour, _handles(spreads))
+        figure, panels = _with_robot(
+            stance, sensitivities, colour, _handles(sensitivities, spreads)
+        )
     else:
         panels = given_axes(axes, names)
         figure = whole_figure(panels[0])
@@ -185,7 +188,7 @@ def _draw_arrows(ax: Axes, drawn: _Drawn, dot: str) -> None:
     for cop, moves in zip(drawn.cops, drawn.moves, strict=True):
         for j, colour in enumerate((_FORWARD, _LEFT)):
             tip = cop + moves[:, j]
-            if np.linalg.norm(moves[:, j]) > 0.5:  # mm: shorter is all head
+            if np.linalg.norm(moves[:, j]) > _SHORTEST:
                 ax.annotate(
                     "",
                     (tip[1], tip[0]),
@@ -214,7 +217,7 @@ def _write_loads(
     front = np.median(origins[:, 0])
     points = all(sole is None for sole in soles)
     reach, spread = np.ptp(origins[:, :2], axis=0)
-    aside = points and spread < _NARROW * reach  # words go out to both sides, lest they meet
+    aside = points and spread < _NARROW * reach  # words go out from the middle, lest they meet
     axis = (origins[:, 1].min() + origins[:, 1].max()) / 2
     for k, contact in enumerate(stance.contacts):
         share = result.equilibrium.wrenches[k, 2] / stance.robot.weight
@@ -228,12 +231,13 @@ def _write_loads(
         sole, ahead = soles[k], origins[k, 0] >= front - 1.0
         edge = origins[k, 0] if sole is None else sole[:, 0].max() if ahead else sole[:, 0].min()
         middle = origins[k, 1] if sole is None else (sole[:, 1].min() + sole[:, 1].max()) / 2
+        side = _side(middle - axis) if aside else "center"
         ax.annotate(
             "\n".join(lines),
-            (middle, edge),
-            xytext=(0, 9 if ahead else -9),
+            (middle if side == "center" else axis, edge),
+            xytext=({"right": -5, "left": 5}.get(side, 0), 9 if ahead else -9),
             textcoords="offset points",
-            ha=_side(middle - axis) if aside else "center",
+            ha=side,
             va="bottom" if ahead else "top",
             fontsize=8.5,
             color=INK,
@@ -257,7 +261,7 @@ def _write_loads(
 
 
 def _side(left: float) -> str:
-    """Words of a left foot end at it, of a right foot start there: the two do not meet."""
+    """Words of a left foot end at the middle, of a right foot start there: they do not meet."""
     return "center" if abs(left) < 1.0 else "right" if left > 0 else "left"
 
 
@@ -266,10 +270,19 @@ def _length(travel: float) -> str:
     return f"{travel:.1f} m" if travel >= 1.0 else f"{travel * MM:.0f} mm"
 
 
-def _handles(spreads: Sequence[Spread] | None) -> list[Line2D]:
+def _handles(
+    sensitivities: Sequence[CopSensitivity], spreads: Sequence[Spread] | None
+) -> list[Line2D]:
     def arrow(colour: str, words: str) -> Line2D:
         return Line2D([], [], color=colour, linewidth=2.0, marker=9, markersize=7, label=words)
 
+    moves = np.concatenate([s.com_gain for s in sensitivities]) * _STEP
+    arrows = []
+    if np.linalg.norm(moves, axis=1).max() > _SHORTEST:  # points have none
+        arrows = [
+            arrow(_FORWARD, f"CoP if the CoM goes {_STEP:.0f} mm forward"),
+            arrow(_LEFT, f"{_STEP:.0f} mm to the left"),
+        ]
     unsure = []
     if spreads:
         words = f"{spreads[0].sigmas:g} standard deviations of the CoP"
@@ -281,7 +294,6 @@ def _handles(spreads: Sequence[Spread] | None) -> list[Line2D]:
         Line2D([], [], color=MUTED, marker="o", linestyle="none", label="CoP"),
         Line2D([], [], color=INK, marker="+", markersize=11, linestyle="none", label="CoM"),
         Line2D([], [], label="CoM on the ground", **RING),
-        arrow(_FORWARD, f"CoP if the CoM goes {_STEP:.0f} mm forward"),
-        arrow(_LEFT, f"{_STEP:.0f} mm to the left"),
+        *arrows,
         *unsure,
     ]
