@@ -55,6 +55,7 @@ def test_a_notebook_asserts_a_number_and_holds_no_outputs(notebook):
     [
         "docs/adding.md",
         "docs/balancing.md",
+        "docs/drives.md",
         "docs/explore.md",
         "docs/hardware.md",
         "docs/learning.md",

@@ -32,7 +32,7 @@ from support.tiny import urdf  # noqa: E402
 # What a page shows and this cannot run -> why.
 NOT_HERE = {
     r"^make ": "needs the checkout",
-    r"^pip install -e ": "needs the checkout",
+    r"^pip install (-e |\"?\.)": "needs the checkout",
     r"^dask |\bHOST\b|\.\.\.": "stands for something else",
     r"^copsense explore (?!.*--export)": "waits for a browser",
 }

@@ -45,6 +45,6 @@ assert abs(float(per_hip_roll.sel(criterion="minimum-torque")) + 0.196) < 0.001
 
 # %%
 # The same in 3-D (``pip install "copsense[explore]"``): drag to turn it; the bar under it plays and
-# scrubs. A notebook shows it likewise, and ``.save("icub.html")`` makes a page to give on.
+# scrubs. A notebook shows it likewise, and ``.save("icub.html")`` makes a page to pass on.
 
 data.show(stance)

@@ -24,7 +24,7 @@ stance = copsense.robots.stand(model, contacts, home.q)
 print(f"{stance.admissible_motions.shape[1]} admissible motions")
 
 # %%
-# Which way of sharing the load lets the body go farther before a foot is bare?
+# Which way of sharing the load lets the body go farther before a foot is unloaded?
 
 for criterion in (copsense.minimum_wrench(0.2), copsense.minimum_torque()):
     result = copsense.cop_sensitivity(stance, criterion)

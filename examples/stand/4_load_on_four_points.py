@@ -3,7 +3,7 @@ The load on four points
 =======================
 
 A quadruped stands on points, whose centres of pressure cannot move. What its balance says is how
-the load goes over from foot to foot, and when one of them is bare.
+the load goes over from foot to foot, and when one of them is unloaded.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ print(data)
 # %%
 # Feet at the corners of a rectangle, and forces as small as can be: four forces that are affine in
 # the feet's places. Then each foot's share is 1/4 + y/(4 d) when the CoM is y aside, with d half
-# the track. It is bare where the CoM is over the feet of the other side.
+# the track. It is unloaded where the CoM is over the feet of the other side.
 
 forces = data["wrench"].sel(component="fz") / stance.robot.weight
 share = forces.sel(criterion="minimum-wrench", contact="LF_FOOT").values

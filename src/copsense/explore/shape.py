@@ -297,4 +297,4 @@ def _licence(file: Path) -> str:
             said = f"{'one of ' * (len(terms) > 1)}{', '.join(terms) or 'licence not said'}"
             return f"meshes of {root.findtext('name', folder.name)}: {said}"
     where = f"{file.parents[1].name}/{file.parent.name}" if len(parts) > 2 else file.name
-    return f"meshes of {where}: no licence was found beside them; ask before you give them on"
+    return f"meshes of {where}: no licence was found beside them; ask before you pass them on"
