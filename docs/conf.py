@@ -97,6 +97,16 @@ def keep_figures(block: object, block_vars: dict, gallery_conf: dict) -> str:
     return figure_rst(paths, gallery_conf["src_dir"])
 
 
+def draw_as_copsense_does(gallery_conf: dict, file: str | None) -> None:
+    """Give what an example draws itself the style of copsense's figures."""
+    import matplotlib as mpl
+
+    from copsense.plots.style import STYLE, colours
+
+    own = colours(["minimum-torque", "minimum-wrench", "a", "b", "c", "d"]).values()
+    mpl.rcParams.update(STYLE | {"axes.prop_cycle": mpl.cycler(color=list(own))})
+
+
 sphinx_gallery_conf = {
     "image_scrapers": (keep_figures,),
     "examples_dirs": str(HERE.parent / "examples"),
@@ -104,13 +114,14 @@ sphinx_gallery_conf = {
     # Every example runs at every build.
     "filename_pattern": r"\.py$",
     "run_stale_examples": True,
+    "capture_repr": ("_repr_html_",),  # not what Matplotlib's calls return
     "subsection_order": ExplicitOrder(
         [f"../examples/{folder}" for folder in ("share", "stand", "limits", "many", "time")]
     ),
     "within_subsection_order": "FileNameSortKey",
     "remove_config_comments": True,
     "download_all_examples": False,
-    "reset_modules": (),
+    "reset_modules": (draw_as_copsense_does,),
     "show_signature": False,
     "write_computation_times": False,
     "show_memory": False,

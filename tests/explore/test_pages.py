@@ -56,6 +56,7 @@ def test_an_exported_page_draws_the_robot_and_requests_nothing(
         scale = page.locator(".marks", has_text="Joints by torque under minimum-torque")
         assert "linear-gradient" in scale.locator("span").get_attribute("style")
         assert "copsense analyse icub --com-y 0.03m" in page.locator("code").inner_text()
+        assert page.locator("#flat").is_hidden()  # what a browser without WebGL says
         outside = ("file:", "data:", "blob:", "about:")
         assert [u for u in page.requested if not u.startswith(outside)] == []
         assert [u for u in page.requested if u.startswith("file:")] == [exported.as_uri()]

@@ -37,6 +37,14 @@ td, th { padding: .1rem .9rem .1rem 0; text-align: left; white-space: nowrap; }
 code { overflow-wrap: anywhere; font-size: .85em; }
 footer, .marks { opacity: .75; font-size: .85em; }
 """
+# A frame without WebGL would stay empty, and say nothing.
+_FLAT = (
+    '<p id="flat" hidden>This browser has no WebGL, so the picture in 3-D is left out. The numbers '
+    "below are its own.</p><script>{const c = document.createElement('canvas'); "
+    "if (!(c.getContext('webgl2') || c.getContext('webgl'))) {"
+    "document.getElementById('flat').hidden = false; document.querySelector('iframe').remove();}}"
+    "</script>"
+)
 _HEADS = ("criterion", "contact", "load", "CoP x, y [mm]", "margin [mm]", "CoM travel [mm]")
 _FILM_HEADS = ("centres of pressure", "least margin [mm]", "of", "at")
 
@@ -242,7 +250,7 @@ def _page(name: str, scene: str, body: Parts, code: str, licences: Sequence[str]
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{name}</title><style>{_STYLE}</style></head><body>"
-        f"<h1>{name}</h1>{before}{frame}{after}{command}"
+        f"<h1>{name}</h1>{before}{frame}{_FLAT}{after}{command}"
         f"<footer>{made}<p>Made by copsense {__version__}; the 3-D view is by viser.</p>"
         f"<details><summary>Licences of the 3-D view</summary><pre>{_text(client_notices())}</pre>"
         "</details></footer></body></html>\n"

@@ -47,7 +47,7 @@ _NOTEBOOK_DPI = 90.0
 _TITLE = 17.0  # points that a title over the axes takes
 _LETTERS, _HANDLE = 15.0, 6  # letters per inch of a legend; letters that a handle takes
 
-_RC = {
+STYLE = {
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
     "axes.titlesize": 10.5,
@@ -90,7 +90,7 @@ def styled(plot: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(plot)
     def draw(*args: P.args, **kwargs: P.kwargs) -> R:
-        with mpl.rc_context(_RC):  # type: ignore[arg-type]
+        with mpl.rc_context(STYLE):  # type: ignore[arg-type]
             return plot(*args, **kwargs)
 
     return draw
