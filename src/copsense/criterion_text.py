@@ -6,12 +6,13 @@ import math
 import re
 from collections.abc import Callable, Iterator
 
-from copsense.criterion import Criterion, criterion_named, weighted_torque
+from copsense.criterion import CRITERIA, Criterion, criterion_named, weighted_torque
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.stiffness import stiffness
 
 STIFFNESS, WEIGHTED = "stiffness", "weighted-torque"
 _SOLE = ("fx", "fy", "fz", "mx", "my", "mz")
+_EXAMPLES = ("weighted-torque:hip=2,knee=1,rest=1", "stiffness:hip=4000,rest=2000")
 _FORMS = {
     STIFFNESS: (
         "Give numbers in Nm/rad: 'stiffness:2000' for all joints alike, or by part of the joints' "
@@ -41,6 +42,8 @@ def criterion_from_text(text: str, characteristic_length: float = 1.0) -> Criter
     """
     kind, colon, listed = text.partition(":")
     if not colon and kind not in _FORMS:
+        if kind not in CRITERIA:
+            raise UnknownNameError("criterion", kind, (*CRITERIA, *_EXAMPLES))
         return criterion_named(text, characteristic_length)
     if kind not in _READERS:
         raise UnknownNameError("criterion with numbers", kind, _READERS)

@@ -12,13 +12,23 @@ from typing import Literal
 from copsense.errors import ModelLoadError
 from copsense.listing import first_few, listed
 from copsense.sdf import sdf_faults, sdf_notes
-from copsense.urdf import strip_numbers, urdf_faults, urdf_notes, without_namespace, xacro_left
+from copsense.urdf import (
+    strip_numbers,
+    take_out_xacro,
+    urdf_faults,
+    urdf_notes,
+    without_namespace,
+    xacro_left,
+)
 from copsense.written_base import take_out_base
 from copsense.xml_numbers import wrong_number
 
 Language = Literal["urdf", "mjcf", "sdf"]
 
-_DRAKE = 'xmlns:drake="http://drake.mit.edu"'
+_PREFIXES = {
+    "xacro": 'xmlns:xacro="http://www.ros.org/wiki/xacro"',
+    "drake": 'xmlns:drake="http://drake.mit.edu"',
+}
 _ROOTS: dict[Language, str] = {"urdf": "robot", "mjcf": "mujoco", "sdf": "sdf"}
 # Attributes of an MJCF's bodies, inertials and joints that hold numbers; the parser reads a word as
 # whatever comes next in memory or as zero.
@@ -90,12 +100,12 @@ def load_description(
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     if not isinstance(source, str | Path):
         raise ModelLoadError(
-            f"{source!r} is not a path. Give the path of a {kind} file, or its text."
+            f"{source!r} is not a path. Give the path of a {kind} file, or in Python its text."
         )
     path = None if is_text else Path(source)
     if path is not None and not is_file(path):
         what = f"{path} is a folder" if is_folder(path) else f"no file at {str(source)[:300]!r}"
-        raise ModelLoadError(f"{what}. Give the path of a {kind} file, or its text.")
+        raise ModelLoadError(f"{what}. Give the path of a {kind} file (in Python also its text).")
     check_package_dirs(package_dirs)
     name = str(path or "the text given")
     text, document = _parse(source if path is None else path, name, kind)
@@ -108,9 +118,15 @@ def load_description(
         ]
         hint = f"Use load_robot or Robot.from_{found} for this one." if found else "Give such one."
         raise ModelLoadError(f"{name} starts with <{document.tag}>, {listed(starts)}. {hint}")
-    if xacro := xacro_left(document) if found == "urdf" else ():
-        raise _unexpanded(name, xacro)
+    beside: tuple[str, ...] = ()
+    xacro = xacro_left(document) if found == "urdf" else ()
+    if xacro:
+        beside = take_out_xacro(document)
+        if inside := xacro_left(document):
+            raise _unexpanded(name, inside)
     faults = list(_FAULTS[found](document))
+    if faults and xacro:
+        raise _unexpanded(name, xacro)  # what is missing is in there
     if faults:
         more = f" (and {len(faults) - 5} more)" if len(faults) > 5 else ""
         raise ModelLoadError(
@@ -120,7 +136,7 @@ def load_description(
     notes: tuple[str, ...] = ()
     if found == "urdf":
         changed |= strip_numbers(document)
-        notes = (*take_out_base(document), *urdf_notes(document))
+        notes = (*beside, *take_out_base(document), *urdf_notes(document))
     elif found == "sdf":
         notes = tuple(sdf_notes(document))
     if changed or notes:
@@ -163,13 +179,12 @@ def _parse(source: str | Path, name: str, kind: str) -> tuple[str, ET.Element]:
     except OSError as error:
         raise ModelLoadError(f"{name} cannot be read: {error}. Choose a readable file.") from None
     except (LookupError, ValueError, ET.ParseError) as error:
-        if "unbound prefix" in str(error) and "<xacro:" in text:
-            raise _unexpanded(name, ("<xacro:...>",)) from None
-        if "unbound prefix" in str(error) and _DRAKE not in text and "<drake:" in text:
-            # Drake's elements, of a prefix that its own parser does not ask to be declared.
-            declared = re.sub(r"<robot(?=\s)", f"<robot {_DRAKE}", text, count=1)
-            if declared != text:
-                return _parse(declared, name, kind)
+        for prefix, space in _PREFIXES.items():
+            # Elements of a prefix that URDF's parsers do not ask to be declared.
+            if "unbound prefix" in str(error) and space not in text and f"<{prefix}:" in text:
+                declared = re.sub(r"<robot(?=\s)", f"<robot {space}", text, count=1)
+                if declared != text:
+                    return _parse(declared, name, kind)
         raise ModelLoadError(
             f"{name} is not XML in UTF-8 or the encoding that it declares: {error}. Give a {kind} "
             "file that is whole."

@@ -8,7 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from copsense.robot import Robot
-from copsense.stance import AT_LIMIT, Stance
+from copsense.stance import Stance
+
+# How far beyond a limit is said: what a printed position is rounded by is not.
+_NOTED = {"rad": math.radians(0.01), "m": 1e-5}
 
 
 def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
@@ -19,7 +22,7 @@ def joint_limit_notes(stance: Stance) -> tuple[str, ...]:
         for joint, unit, excess in zip(
             robot.dof_names, robot.dof_units, stance.joint_limit_excess.tolist(), strict=True
         )
-        if excess > AT_LIMIT
+        if excess > _NOTED[unit]
     )
 
 
@@ -32,7 +35,7 @@ def swept_joint_notes(robot: Robot, excess: Float[np.ndarray, "N n"]) -> tuple[s
     """
     found = []
     for name, unit, column in zip(robot.dof_names, robot.dof_units, excess.T, strict=True):
-        count, most = int((column > AT_LIMIT).sum()), float(np.nanmax(column, initial=0.0))
+        count, most = int((column > _NOTED[unit]).sum()), float(np.nanmax(column, initial=0.0))
         if count:
             found.append(
                 f"{name} is beyond its limit at {count} posture{'s' * (count != 1)}, by up to "

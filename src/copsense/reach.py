@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.errors import UnreachablePostureError
-from copsense.magnitudes import in_metres
+from copsense.magnitudes import check_angle, in_metres
 from copsense.robot import Robot
 
 _TWICE = 2.0  # from the base to the one point, and to the other
@@ -85,3 +85,25 @@ def check_within_reach(
     reason = beyond_reach(robot, metres, what, times, given)
     if reason:
         raise UnreachablePostureError(reason)
+
+
+def check_coordinate(robot: Robot, name: str, unit: str, own: float, value: float) -> None:
+    """Reject a value of a posture's coordinate that only another unit explains.
+
+    Args:
+        robot: the robot.
+        name: of the coordinate: a joint, or as of `copsense.batch.PostureChart`.
+        unit: its unit, ``"m"`` or ``"rad"``.
+        own: the stance's value of it [m, rad].
+        value: what is asked for [m, rad].
+
+    Raises:
+        InvalidInputError: no such position of the joint, or an angle of more than a turn.
+        UnreachablePostureError: a place that is beyond the robot many times over.
+    """
+    if name in robot.joint_names:
+        robot.checked_position(name, value)
+    elif unit == "m":
+        check_within_reach(robot, value - own, f"{name}, from the stance's own,", SWEPT, value)
+    else:
+        check_angle(value, name)

@@ -304,7 +304,10 @@ class Sweep(LabelledResult):
             word, ranges = "no limit active", self.free_range
         for name in names[:_SHOWN]:
             ends = ranges[name]
-            part = "at no posture" if ends is None else f"from {ends[0]:g} to {ends[1]:g} {unit}"
+            part = "at no posture"
+            if ends is not None:
+                low, high = ends
+                part = f"from {low:g} to {high:g} {unit}" if low != high else f"at {low:g} {unit}"
             lines.append(f"  {name}: {word} {part.strip()}")
         if len(names) > _SHOWN:
             lines.append(f"  and {len(names) - _SHOWN} more criteria")

@@ -6,6 +6,7 @@ import xml.etree.ElementTree as ET
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
+from copsense.listing import listed
 from copsense.xml_names import wrong_names
 from copsense.xml_numbers import read_numbers, wrong_number
 
@@ -56,13 +57,37 @@ def xacro_left(root: ET.Element) -> tuple[str, ...]:
     """What of xacro a file still holds: elements, and attributes with ``${...}`` or ``$(...)``."""
     found = []
     for element in root.iter():
-        space, _, name = str(element.tag).rpartition("}")
-        if "xacro" in space:
-            found.append(f"<xacro:{name}>")
+        if name := _xacro_name(element):
+            found.append(name)
         for key, value in element.items():
             if "${" in value or "$(" in value:
                 found.append(f"{key}={value!r}")
     return tuple(dict.fromkeys(found))
+
+
+def take_out_xacro(root: ET.Element) -> tuple[str, ...]:
+    """Take out the xacro that stands beside links and joints, which URDF's parser passes over.
+
+    Returns:
+        A note that says what was taken out; none where nothing was.
+    """
+    beside = [element for element in root if _xacro_name(element)]
+    for element in beside:
+        root.remove(element)
+    if not beside:
+        return ()
+    names = listed(list(dict.fromkeys(map(_xacro_name, beside))))
+    verb = "is" if len(beside) == 1 else "are"
+    return (
+        f"{names} {verb} xacro that was not expanded, and left out: links and joints that it would "
+        "add are not there. If there are any, expand the file first: xacro FILE > robot.urdf.",
+    )
+
+
+def _xacro_name(element: ET.Element) -> str:
+    """How a file writes an element of xacro; empty for another."""
+    space, _, name = str(element.tag).rpartition("}")
+    return f"<xacro:{name}>" if "xacro" in space else ""
 
 
 def urdf_faults(root: ET.Element) -> Iterator[str]:

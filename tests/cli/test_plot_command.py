@@ -23,6 +23,10 @@ def test_a_plot_of_something_else_says_so(tmp_path):
     assert "is not a netCDF file" in copsense("plot", path).error
     assert "no file at" in copsense("plot", tmp_path).error
     assert [p.name for p in tmp_path.iterdir()] == ["notes.nc"]
+    (tmp_path / "made.zarr").mkdir()
+    said = copsense("plot", tmp_path / "made.zarr").error
+    assert "is a map, and plot draws a sweep" in said
+    assert f"--output {tmp_path / 'made.zarr'} --plot" in said
 
 
 def test_a_plot_never_writes_over_a_file_unasked(tmp_path):

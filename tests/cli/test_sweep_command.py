@@ -123,7 +123,7 @@ def test_the_com_is_swept_forwards_and_upwards_too(axis, tmp_path):
         wanted = {"x": [-0.01, 0.02], "z": [0.5, 0.51]}[axis]
         np.testing.assert_allclose(data["com"].sel(com_axis=axis), wanted, rtol=0, atol=1e-12)
     both = copsense("sweep", "icub", "--com-x", "0:1:2", "--com-z", "0:1:2")
-    assert "--com-x, --com-y or --com-z" in both.error
+    assert "--com-x 0:1:2 and --com-z 0:1:2 each sweep" in both.error
 
 
 @pytest.mark.parametrize(
@@ -148,6 +148,14 @@ def test_what_is_so_at_no_posture_is_said_the_other_way_round(
         }
     )  # fmt: skip
     assert capsys.readouterr().out.splitlines()[1] == f"  c: {said}"
+
+
+def test_a_single_posture_that_is_planted_is_no_range(capsys):
+    row = {"planted": (0.01, 0.01), "smallest_margin": -0.002, "static_frequency": None}
+    told = {"robot": "r", "postures": 3, "coordinate": "com_y", "unit": "m", "period": None}
+    _print(told | {"criteria": {"c": row}, "limits": None, "without_sole": "", "failed_rows": 0})
+    said = capsys.readouterr().out.splitlines()[1]
+    assert said.startswith("  c: every contact planted at +0.01 m alone; smallest margin")
 
 
 def test_small_distances_and_directions_have_one_name():

@@ -18,6 +18,7 @@ from copsense.cli.units import read_positions, read_quantity, read_range
 from copsense.comparison.trials import KINDS, Breaking, Sway, option_unit
 from copsense.controllers import Ramp, Sine
 from copsense.errors import InvalidInputError, UnknownNameError
+from copsense.joint_notes import joint_limit_notes
 from copsense.limits import Limits
 from copsense.paper import FourBar, solve_four_bar
 from copsense.robot import Robot
@@ -239,3 +240,15 @@ def test_no_command_has_two_options_of_one_name(name):
     command = cli.copsense.get_command(click.Context(cli.copsense), name)
     names = [name for parameter in command.params for name in parameter.opts]
     assert len(names) == len(set(names))
+
+
+def test_what_a_printed_position_is_rounded_by_is_not_beyond_a_limit(icub):
+    def notes(excess):
+        q = np.array(icub.q)
+        robot = icub.robot
+        upper = dict(zip(robot.dof_names, robot.position_limits[1], strict=True))["l_elbow"]
+        q[robot.model.joints[robot.joint_id("l_elbow")].idx_q] = upper + np.radians(excess)
+        return joint_limit_notes(icub.at(q, check=False))
+
+    assert notes(0.009) == ()
+    assert notes(0.02) == ("l_elbow is 0.02 deg beyond its limit.",)

@@ -394,3 +394,5 @@ def test_a_users_controller_that_is_none_is_one_error(own_module, name, error, s
         load_controller(own_module, icub())
     with pytest.raises(InvalidInputError, match="cannot be imported"):
         load_controller("no_such_module_anywhere:f", icub())
+    with pytest.raises(InvalidInputError, match=r"no file nowhere/mine\.py to read"):
+        load_controller("nowhere/mine.py:f", icub())

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.commands import copsense
 from support.standing import C2, icub, simulator
 
 from copsense.controllers import BalancingController
@@ -53,8 +54,10 @@ def test_a_run_that_stood_is_all_before_a_tip(stood):
 
 
 def test_a_recording_keeps_what_made_it(stood, tmp_path):
-    again = Recording.load(stood.save(tmp_path / "run.nc"))
+    file = stood.save(tmp_path / "run.nc")
+    again = Recording.load(file)
     assert again == stood
+    assert "is a recording, and plot draws a sweep" in copsense("plot", file).error
     assert '"minimum-torque"' in stood.attrs["criteria"]
     assert stood.attrs["limits"] == "null"
     stood.to_xarray().drop_vars("com").to_netcdf(tmp_path / "other.nc")
@@ -72,7 +75,7 @@ def test_a_recording_is_a_table_and_a_picture(stood, fallen, tmp_path):
         assert len(render_figure(run.plot(), ".png", dpi=30)) > 1000
         assert len(repr(run).splitlines()) < 15
         assert "CoM y error" in run._repr_html_()
-    assert "first tip" in repr(fallen)
+    assert f"first {fallen.tip.kind} at" in repr(fallen)
 
 
 @pytest.mark.parametrize("bounds", [(5.0, 6.0), (0.1, 0.05), (np.nan, 1.0), (-2.0, -1.0)])

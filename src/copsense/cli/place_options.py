@@ -117,6 +117,14 @@ class Course:
         return [_option(name) for name in self.com] + ["--joint"] * bool(self.joints)
 
     @property
+    def sweeping(self) -> list[str]:
+        """What is swept, as it is typed."""
+        return [
+            f"{_option(name)} {text}" if name in _COM else f"--joint {name}={text}"
+            for name, text in self.swept.items()
+        ]
+
+    @property
     def places(self) -> dict[str, Any]:
         """What is held, as `place_options` would give it."""
         return {**self.com, "joints": self.joints}

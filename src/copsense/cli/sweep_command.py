@@ -23,6 +23,7 @@ from copsense.cli.printing import (
 from copsense.cli.stance_options import read_stance, swept_stance_options
 from copsense.cli.units import TIME
 from copsense.errors import InvalidInputError
+from copsense.listing import listed
 
 if TYPE_CHECKING:
     from copsense.path import PosturePath
@@ -84,11 +85,7 @@ def sweep(
     from copsense.sweeps import sweep as evaluate
 
     course = read_course(com_x, com_y, com_z, joints)
-    if len(course.swept) + (configurations is not None) != 1:
-        raise InvalidInputError(
-            "say what to sweep, one of: --com-x, --com-y or --com-z START:STOP:COUNT [m], "
-            "--joint NAME=START:STOP:COUNT, --configurations FILE. A single value holds."
-        )
+    _check_one_is_swept(course, configurations)
     if configurations is not None and course.holding:
         raise InvalidInputError(
             f"the rows of {configurations} say where every joint is, and so does "
@@ -118,6 +115,31 @@ def sweep(
     if len(failures) > 5:
         click.echo(f"failed: {len(failures) - 5} more; see the variable 'reason'", err=True)
     click.get_current_context().exit(1 if failures else 0)
+
+
+def _check_one_is_swept(course: Course, configurations: str | None) -> None:
+    """Reject none and several; the message names what was given.
+
+    Raises:
+        InvalidInputError: nothing is swept, or more than one thing.
+    """
+    swept = course.sweeping + [f"--configurations {configurations}"] * (configurations is not None)
+    if len(swept) > 1:
+        raise InvalidInputError(
+            f"{listed(swept)} each sweep, and a sweep is along one. Give the others a single "
+            "value, which holds, or leave them out."
+        )
+    if not swept and course.holding:
+        raise InvalidInputError(
+            f"nothing is swept: {listed(course.holding)} with a single value "
+            f"{'holds' if len(course.holding) == 1 else 'hold'}. A range is START:STOP:COUNT, such "
+            "as --com-y -30mm:30mm:61 or --joint l_knee=-30:-5:11."
+        )
+    if not swept:
+        raise InvalidInputError(
+            "say what to sweep, one of: --com-x, --com-y or --com-z START:STOP:COUNT [m], "
+            "--joint NAME=START:STOP:COUNT, --configurations FILE. A single value holds."
+        )
 
 
 def _read_path(stance: Stance, course: Course, configurations: str | None) -> PosturePath:
@@ -167,7 +189,10 @@ def _print(summary: dict[str, Any]) -> None:
             planted = _nowhere(word, summary)
         else:
             low, high = (value * factor for value in row["planted"])
-            planted = f"{word} from {low:+.4g} to {high:+.4g} {unit}"
+            where = f"at {low:+.4g} {unit} alone"  # of all the postures
+            if low != high:
+                where = f"from {low:+.4g} to {high:+.4g} {unit}"
+            planted = f"{word} {where}"
         if row["smallest_margin"] is not None:
             planted += (
                 f"; smallest margin on the way {_rounded(row['smallest_margin'] * 1e3):+.1f} mm"

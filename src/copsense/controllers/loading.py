@@ -58,6 +58,11 @@ def load_controller(source: str, stance: Stance) -> Controller:
             "my_controller:MyController."
         )
     module_name, folder = _module(given)
+    if given.endswith(".py") and not (folder / Path(given).name).is_file():
+        raise InvalidInputError(
+            f"there is no file {given} to read the controller from, seen from {Path.cwd()}. Give "
+            "the path of a Python file, or the name of a module."
+        )
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     try:

@@ -22,6 +22,7 @@ from copsense.optimisation.variables import (
     usual_coordinates,
     variables_of,
 )
+from copsense.reach import SWEPT, check_within_reach
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import with_tie_break
 
@@ -100,6 +101,7 @@ def asked(
                 f"contradictory constraints: two contacts are to be at least {shown(low, 'm')} and "
                 f"at most {shown(high, 'm')} apart. Give LOW < HIGH."
             )
+        check_within_reach(stance.robot, low, "the least distance of two contacts", SWEPT)
         distance = (low, float(high))
     shares = with_tie_break(stance, minimum_torque() if criterion is None else criterion)
     gauge = Gauge(stance, limits, frame)

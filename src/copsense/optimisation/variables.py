@@ -30,7 +30,9 @@ from copsense.content import ShortRepr
 from copsense.design import Family
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.freedom import com_held, missing_joints
+from copsense.magnitudes import check_angle
 from copsense.path import COM_COORDINATES
+from copsense.reach import SWEPT, check_coordinate, check_within_reach
 from copsense.stance import Stance
 
 Range = tuple[float, float]
@@ -176,6 +178,11 @@ def _range(stance: Stance, name: str, given: Range | float | None) -> Range:
         return _usual_range(stance, name, own, chart)
     if isinstance(given, int | float):
         width = finite_number(given, f"the range of {name}", positive=True)
+        what = f"how far {name} may go to either side"
+        if unit == "m":
+            check_within_reach(stance.robot, width, what, SWEPT)
+        else:
+            check_angle(width, what)
         return own - width, own + width
     check_type(given, (tuple, list), f"a range of {name}", "Give lowest and highest value.")
     low, high = (finite_number(value, f"the range of {name}") for value in given)
@@ -184,6 +191,8 @@ def _range(stance: Stance, name: str, given: Range | float | None) -> Range:
             f"the range of {name}, {shown(low, unit)} to {shown(high, unit)}, is empty: nothing "
             "could vary. Give LOW < HIGH, or leave it out to keep it where it is."
         )
+    for end in (low, high):
+        check_coordinate(stance.robot, name, unit, own, end)
     return low, high
 
 

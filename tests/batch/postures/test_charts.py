@@ -215,7 +215,7 @@ def test_what_cannot_be_is_a_row_with_its_reason(case):
         stance.robot.model.joints[stance.robot.joint_id("l_elbow")].idx_q
     ]
     rows = [[z, elbow], [z + 0.5, elbow], [z, 9.0], [z - 0.01, elbow], [1e9, 1e9]]
-    # As the notes of an analysis say: a micrometre or microradian beyond its limit is at it.
+    # A micrometre or microradian beyond its limit is at it.
     rows += [[z, limit + 5e-7], [z, limit + 5e-6]]
     batch = chart.solve(rows)
     assert list(batch.converged) == [True, False, False, True, False, True, False]
