@@ -57,8 +57,8 @@ def pressed(path):
     """Share of the answers within limits in which a limit presses."""
     import copsense
 
-    active = copsense.load_map(path)["active_limits"].values
-    return float((active > 0).sum() / max((active >= 0).sum(), 1))
+    state = copsense.load_map(path)["state_within"]  # 0 within, 1 pressed
+    return float((state == 1).sum() / max((state <= 1).sum(), 1))
 
 
 def one_map(count, threads, within):

@@ -133,6 +133,16 @@ def test_lost_postures_are_reported_with_remedy_and_reason(tmp_path):
     assert "unreachable, first at com_x -0.0600 m, com_y -0.0600 m: contact" in answer.out
 
 
+def test_postures_at_which_limits_leave_a_contact_without_load_are_counted(tmp_path):
+    feet = ("--contact", "l_sole", "--contact", "r_sole", "--contact", "l_hand:point")
+    wall = ("--plane", "l_hand=-1:0.3:0.05:0.20391059:0.15804044:0.57690426")
+    ranges = ("--over", "com_y=-0.02:0.02:3", "--over", "com_z=0.536:0.536:1")
+    limits = ("--limits", "friction=0.3,torque=20", "--criterion", "minimum-torque")
+    answer = run("map", "icub", *feet, *wall, *limits, *ranges, "--output", tmp_path / "m.zarr")
+    assert answer.code == 0, answer.err
+    assert "limits: a contact is left without load at 1 posture (33.3%)" in answer.out
+
+
 def test_of_points_the_travel_is_that_until_the_first_unloads(tmp_path, stance_of):
     ranges = ("--over", "com_x=-0.01:0.01:3", "--over", "com_y=-0.01:0.01:3")
     outputs = ("--output", tmp_path / "m.zarr", "--plot", tmp_path / "m.png")

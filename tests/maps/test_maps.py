@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
+from support.grounds import with_hand
 
 import copsense
 from copsense.batch import BatchKernel, PostureChart
+from copsense.batch.statics.limit_states import LIMIT_STATES
 from copsense.errors import CopsenseError
 from copsense.maps import Axis, Grid, Sample, chunks
 from copsense.maps.chunks import ChunkEvaluator
@@ -176,9 +178,16 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
     grid = Grid((Axis("com_z", z, z, 1), Axis("com_x", -0.08, 0.12, 9)))
     limits = copsense.Limits(friction=0.3, cop_margin=0.02)
     path = tmp_path / "m.zarr"
-    copsense.map_postures(icub, grid, both, path, limits, configurations=True)
+    summary = copsense.map_postures(icub, grid, both, path, limits, configurations=True)
     dataset = copsense.load_map(path)
-    statuses = dataset["status"].values
+    statuses, states = dataset["status"].values, dataset["state_within"].values
+    assert dataset["state_within"].attrs["flag_meanings"] == " ".join([*LIMIT_STATES, "pending"])
+    assert ((states == 2) == (statuses == 3)).all()
+    assert ((states == 4) == (statuses == 1)).all()
+    assert (np.isnan(dataset["cop_within"].values).any((-1, -2)) == (states > 1)).all()
+    for j, criterion in enumerate(both):
+        counts = dict(zip(LIMIT_STATES, np.bincount(states[:, j], minlength=5), strict=True))
+        assert summary.criteria[criterion.name].counts_within == counts
     assert (statuses == 0).any()
     assert (statuses == 3).any()
     for row, q in enumerate(dataset["configuration"].values):
@@ -204,12 +213,33 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
                 within = copsense.cop_sensitivity(here, criterion, limits)
                 presses = len(within.equilibrium.pressing)
                 assert dataset["active_limits"].values[row, j] == presses
+                assert states[row, j] == (presses > 0)
                 for column, value in (
                     ("cop_within", within.cop),
                     ("com_gain_within", within.com_gain),
                 ):
                     stored = dataset[column].values[row, j]
                     np.testing.assert_allclose(stored, value, rtol=1e-5, atol=1e-6)
+
+
+def test_a_contact_that_limits_leave_without_load_is_said_so(icub, both, tmp_path):
+    # A hand that minimum torque has pull on a wall beside it: within friction, it lets go.
+    stance = with_hand(icub, "l_hand", (-1, 0.3, 0.05))
+    z = float(stance.com[2]) - 0.01
+    grid = Grid((Axis("com_y", -0.02, 0.02, 3), Axis("com_z", z, z, 1)))
+    limits = copsense.Limits(friction=0.3, torque=20.0)
+    path = tmp_path / "m.zarr"
+    summary = copsense.map_postures(stance, grid, both[1:], path, limits, configurations=True)
+    dataset = copsense.load_map(path).isel(criterion=0)
+    assert (dataset["status"].values == 0).all()
+    unloaded = dataset["state_within"].values == 3
+    assert unloaded.tolist() == [False, False, True]
+    assert summary.criteria[both[1].name].counts_within["unloaded"] == 1
+    assert (np.isnan(dataset["cop_within"].values).all((-1, -2)) == unloaded).all()
+    for row, q in enumerate(dataset["configuration"].values):
+        found = copsense.solve_equilibrium(stance.at(q), both[1], limits)
+        assert found.unloaded == (("hand",) if unloaded[row] else ())
+        assert dataset["active_limits"].values[row] == len(found.pressing)
 
 
 def test_feet_and_joints_are_coordinates_too(icub, both, tmp_path):

@@ -218,6 +218,7 @@ def all_results(icub) -> dict[str, object]:
                     {50.0: 0.1},
                     {50.0: 1.0},
                     {"unreachable": FailedPosture(1, dict(somewhere), "too far")},
+                    counts_within={"within": 1},
                 )
             },
         ),

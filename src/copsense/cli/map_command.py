@@ -25,6 +25,7 @@ from copsense.cli.uncertainty_option import read_uncertainty, uncertainty_option
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.extras import require
+from copsense.listing import counted
 
 if TYPE_CHECKING:
     from copsense.maps import Axis, CriterionSummary, MapSummary
@@ -293,7 +294,7 @@ def _failures(summary: MapSummary) -> int:
 
 def _print(summary: MapSummary, plot: str | None, span: float) -> None:
     over = ", ".join(summary.coordinates)
-    click.echo(f"{summary.robot}: {summary.postures} postures over {over}")
+    click.echo(f"{summary.robot}: {counted(summary.postures, 'posture')} over {over}")
     units = dict(zip(summary.coordinates, summary.units, strict=True))
     printed: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
     for name, row in summary.criteria.items():
@@ -306,6 +307,11 @@ def _print(summary: MapSummary, plot: str | None, span: float) -> None:
                 reason = first.reason.removeprefix(f"{status}: ")
                 click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
             printed.add((status, first.posture))
+        if unloaded := row.counts_within.get("unloaded", 0):
+            click.echo(
+                f"    within the limits: a contact is left without load at "
+                f"{counted(unloaded, 'posture')} ({unloaded / row.counts['evaluated']:.1%})"
+            )
         if row.worst_travel:
             click.echo(f"    CoM travel: {_travel(row, units, span)}")
         if row.worst_gain:
@@ -331,7 +337,7 @@ def _travel(row: CriterionSummary, units: dict[str, str], span: float) -> str:
         return f"worst {worst.value * 1e3:+.1f} mm at {where}; median {half}"
     count = row.without_travel
     return (
-        f"none at {count} posture{'s' * (count != 1)} ({count / row.counts['evaluated']:.1%}), "
+        f"none at {counted(count, 'posture')} ({count / row.counts['evaluated']:.1%}), "
         f"worst at {where}; median {half}"
     )
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
+from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNANSWERED, UNLOADED
 from copsense.errors import CopsenseError
 from copsense.magnitudes import check_angle
 from copsense.maps.columns import (
     EVALUATED,
     INFEASIBLE,
     REJECTED,
+    STATE_WITHIN,
     UNREACHABLE,
     UNSOLVED,
     Chunk,
@@ -91,7 +93,10 @@ class ChunkEvaluator:
         status[~postures.converged] = UNREACHABLE
         for row in np.flatnonzero(~postures.converged):
             reason[row] = postures.reasons[row]
-        return {"status": status, "reason": reason}
+        found: Chunk = {"status": status, "reason": reason}
+        if self._within is not None:
+            found[STATE_WITHIN] = np.full(shape, UNANSWERED, dtype=np.uint8)
+        return found
 
     def _answers(self, configurations: np.ndarray, rows: np.ndarray, found: Chunk) -> Chunk:
         """What the kernel answers at some rows; status and reason go into `found`."""
@@ -148,18 +153,20 @@ class ChunkEvaluator:
         limits, status, reason = result.limits, found["status"], found["reason"]
         assert limits is not None
         for (i, j), why in result.reasons.items():
-            state = limits.states[limits.state[i, j]]
-            if (i, j) in own.reasons or state == "unloaded":  # wrenches there are
+            state = limits.state[i, j]
+            if (i, j) in own.reasons or state == UNLOADED:  # wrenches there are
                 continue
-            status[rows[i], j] = INFEASIBLE if state == "infeasible" else UNSOLVED
+            status[rows[i], j] = INFEASIBLE if state == IMPOSSIBLE else UNSOLVED
             reason[rows[i], j] = why
         kinds = np.array([kind for _, kind in limits.margin_names])
         margins = [limits.own_margins[..., kinds == kind].min(axis=-1) for kind in self._kinds]
+        without = np.isnan(result.cops).any(axis=(-1, -2))
+        state = np.where(without & (limits.state <= PRESSED), UNANSWERED, limits.state)
+        known = (state <= PRESSED) | (state == UNLOADED)
         return {
             "limit_margin": np.stack(margins, axis=-1),
-            "active_limits": np.where(
-                np.isnan(result.cops).any(axis=(-1, -2)), -1, (limits.pressing >= 0).sum(axis=-1)
-            ),
+            STATE_WITHIN: state,
+            "active_limits": np.where(known, (limits.pressing >= 0).sum(axis=-1), -1),
             "cop_within": result.cops,
             "com_gain_within": result.com_gain,
         }

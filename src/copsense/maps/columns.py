@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from copsense.batch import PostureChart
+from copsense.batch.statics.limit_states import LIMIT_STATES
 from copsense.maps.map_plan import MapPlan
 from copsense.margins import MarginTable, margin_table
 from copsense.sweep_layout import variable_name
@@ -96,10 +97,22 @@ _LIMIT_MARGIN = Column(
     "smallest distance of the criterion's own wrenches to the limits of each kind; negative where "
     "they break the limits",
 )
+STATE_WITHIN = "state_within"
 _WITHIN = {
     "limit_margin": _LIMIT_MARGIN,
+    STATE_WITHIN: Column(
+        _EACH,
+        "uint8",
+        "",
+        "how the posture stands to its limits; see flag_meanings. Unloaded: the wrenches within "
+        "them leave a contact without load, which has no centre of pressure. Unanswered: see "
+        "status and reason",
+    ),
     "active_limits": Column(
-        _EACH, "int16", "", "number of limits that press within the limits; -1 where not evaluated"
+        _EACH,
+        "int16",
+        "",
+        "number of limits that press within the limits; -1 where no wrenches within them are known",
     ),
     "cop_within": Column(
         (*_EACH, "contact", "axis"), "float32", "m", "centre of pressure within the limits"
@@ -176,6 +189,10 @@ def labels(plan: MapPlan) -> dict[str, tuple[str, ...]]:
 def limit_kinds(table: MarginTable) -> tuple[str, ...]:
     """The kinds of limits that there are."""
     return tuple(dict.fromkeys(table.kinds))
+
+
+FLAGS = {"status": STATUS, STATE_WITHIN: LIMIT_STATES}
+"""Columns of codes, and what each code says; `PENDING` comes beside these."""
 
 
 def fill_value(column: Column) -> Any:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from copsense.content import ShortRepr, freeze
 from copsense.json_data import json_data
-from copsense.maps.columns import EVALUATED, STATUS
+from copsense.maps.columns import EVALUATED, FLAGS, STATE_WITHIN, STATUS
 from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
 from copsense.maps.store import MapStore
 
@@ -76,6 +76,9 @@ class CriterionSummary(ShortRepr):
         failed: status -> the first posture of it, with its reason.
         without_travel: evaluated postures where a centre of pressure is off its sole already, or a
             contact pulls: their travel is negative.
+        counts_within: postures of each state within the limits, as of the column ``state_within``;
+            empty without limits. Where one is unloaded, its wrenches within the limits leave a
+            contact without load.
     """
 
     counts: Mapping[str, int]
@@ -85,10 +88,11 @@ class CriterionSummary(ShortRepr):
     gain_percentiles: Mapping[float, float]
     failed: Mapping[str, FailedPosture]
     without_travel: int = 0
+    counts_within: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Own the mappings."""
-        freeze(self, "counts", "travel_percentiles", "gain_percentiles", "failed")
+        freeze(self, "counts", "travel_percentiles", "gain_percentiles", "failed", "counts_within")
 
 
 @dataclass(frozen=True, repr=False)
@@ -141,6 +145,7 @@ class MapSummary(ShortRepr):
                     "travel_percentiles": row.travel_percentiles,
                     "gain_percentiles": row.gain_percentiles,
                     "without_travel": row.without_travel,
+                    "counts_within": row.counts_within,
                     "failed": {status: asdict(first) for status, first in row.failed.items()},
                 }
                 for name, row in self.criteria.items()
@@ -161,6 +166,8 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
     first: dict[tuple[int, int], int] = {}  # chunk with the first posture of a status
     shares = Percentiles(len(QUANTITIES) * len(store.criteria), LEVELS)
     without = np.zeros(len(store.criteria), dtype=np.int64)
+    states = FLAGS[STATE_WITHIN] if store.limited else ()
+    within = np.zeros((len(store.criteria), len(states)), dtype=np.int64)
 
     def count(block: np.ndarray) -> None:
         shares.count(block)
@@ -174,6 +181,10 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
                 first.setdefault((int(j), int(code)), i)
         total = fold(parts if total is None else [total, *parts])
         report(_rows(store, start, end, count))
+        if states:
+            first_row, last_row = store.bounds(start)[0], store.bounds(end - 1)[1]
+            codes = store.read(STATE_WITHIN, first_row, last_row)
+            within += (codes[..., None] == np.arange(len(states))).sum(axis=0)
     for start, end in runs:
         report(_rows(store, start, end, shares.refine))
     levels = shares.found().reshape(len(QUANTITIES), len(store.criteria), len(LEVELS))
@@ -201,6 +212,7 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
                 if column == j and code != EVALUATED
             },
             int(without[j]),
+            dict(zip(states, within[j].tolist(), strict=True)),
         )
     return MapSummary(
         str(store.path),

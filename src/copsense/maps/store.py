@@ -29,7 +29,9 @@ from copsense.extras import require
 from copsense.files import check_output, checked_path
 from copsense.maps.columns import (
     EVALUATED,
+    FLAGS,
     PENDING,
+    STATE_WITHIN,
     STATUS,
     Chunk,
     Column,
@@ -128,6 +130,11 @@ class MapStore:
         known = self.read("status", start, stop) == EVALUATED
         rows = [np.where(known, self.read(name, start, stop), np.nan) for name in columns]
         return np.stack(rows, axis=1)
+
+    @property
+    def limited(self) -> bool:
+        """Whether the postures were evaluated within limits too."""
+        return STATE_WITHIN in self._arrays
 
     def write(self, index: int, chunk: Chunk, part: Part) -> None:
         """Write a chunk; its mark comes last, so a chunk that is marked is whole.
@@ -326,9 +333,9 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
     for name, column in columns(plan).items():
         inner = tuple(sizes[d] for d in column.dims[1:])
         array = add(group, name, column, (min(plan.size, count), *inner))
-        if name == "status":
-            array.attrs["flag_values"] = [*range(len(STATUS)), PENDING]
-            array.attrs["flag_meanings"] = " ".join([*STATUS, "pending"])
+        if flags := FLAGS.get(name):
+            array.attrs["flag_values"] = [*range(len(flags)), PENDING]
+            array.attrs["flag_meanings"] = " ".join([*flags, "pending"])
     for dim, found in names.items():
         array = add(group, dim, Column((dim,), "str", "", dim.replace("_", " ")), (len(found),))
         array[:] = np.array(found, dtype=object)
