@@ -1,6 +1,8 @@
 """A map holds what one posture at a time gives, however it was cut, stopped and resumed."""
 
+import os
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from copsense.errors import CopsenseError
 from copsense.maps import Axis, Grid, Sample, chunks
 from copsense.maps.chunks import ChunkEvaluator
 from copsense.maps.heights import height_advice
+from copsense.maps.leftovers import _prefix
 from copsense.maps.map_plan import MapPlan
 
 
@@ -153,8 +156,6 @@ def test_a_map_resumed_or_cut_among_threads_is_the_same_bits(
 
 
 def test_a_chunk_without_its_mark_is_evaluated_again(icub, both, sample, whole, tmp_path, same):
-    import shutil
-
     import zarr
 
     path = tmp_path / "m.zarr"
@@ -163,6 +164,32 @@ def test_a_chunk_without_its_mark_is_evaluated_again(icub, both, sample, whole, 
     group["done"][4], group["com_travel"][4 * 32 : 4 * 32 + 7] = 0, 123.0
     copsense.map_postures(icub, sample, both, path, chunk=32)
     assert same(path, whole[0])
+
+
+def test_what_killed_processes_left_is_removed_unless_another_holds_it(
+    icub, both, sample, whole, tmp_path
+):
+    fcntl = pytest.importorskip("fcntl")
+    path = tmp_path / "m.zarr"
+    folders = [tmp_path / f"{_prefix(path)}{n}.zarr" for n in ("dead", "live")]
+    for folder in folders:
+        (folder / "parts").mkdir(parents=True)
+    live = os.open(folders[1], os.O_RDONLY)
+    fcntl.flock(live, fcntl.LOCK_SH)
+    shutil.copytree(whole[0], path)
+    finished = {p.relative_to(path) for p in path.rglob("*")}
+    left = path / "parts" / "worst" / "c" / "4" / "0" / f"0.{'0f' * 16}.partial"
+    left.parent.mkdir(parents=True, exist_ok=True)
+    left.write_bytes(b"half")
+    other = os.open(path, os.O_RDONLY)
+    fcntl.flock(other, fcntl.LOCK_SH)
+    copsense.map_postures(icub, sample, both, path, chunk=32)
+    assert left.exists()
+    os.close(other)
+    copsense.map_postures(icub, sample, both, path, chunk=32)
+    assert {p.relative_to(path) for p in path.rglob("*")} == finished
+    assert [folder.exists() for folder in folders] == [False, True]
+    os.close(live)
 
 
 def test_values_do_not_depend_on_the_chunks(whole, icub, both, sample, tmp_path):

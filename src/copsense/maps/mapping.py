@@ -116,6 +116,7 @@ def fill_map(
         with connect(scheduler, workers) as client:
             store = create_map(where, plan)
             evaluate_on_workers(client, plan, store, _pending(plan, store, report), report)
+    store.remove_leftovers()
     return store
 
 

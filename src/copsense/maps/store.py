@@ -11,8 +11,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import shutil
-import tempfile
 import warnings
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -40,6 +38,7 @@ from copsense.maps.columns import (
     fill_value,
     labels,
 )
+from copsense.maps.leftovers import held, new_folder, remove_folders, remove_partial_files
 from copsense.maps.map_plan import FORMAT, MapPlan
 from copsense.maps.reduction import QUANTITIES, WORST, Part
 from copsense.provenance import differences, digest, worded
@@ -143,13 +142,17 @@ class MapStore:
             OutputError: the disk is full, or cannot be written.
         """
         start = index * self._size
-        with self._errors("be written"):
+        with self._errors("be written"), held(self.path):
             for name, rows in chunk.items():
                 if name != "reason" or (rows != "").any():  # nothing stored reads as empty
                     self._arrays[name][start : start + len(rows)] = rows
             for name in ("counts", "worst", "values"):
                 self._parts[name][index] = getattr(part, name)
             self._arrays["done"][index] = 1
+
+    def remove_leftovers(self) -> None:
+        """Remove what processes that were killed left of files, if no process writes now."""
+        remove_partial_files(self.path)
 
     def parts(self, first: int, end: int) -> list[Part]:
         """What each chunk of a run contributes to the reductions."""
@@ -234,16 +237,14 @@ def create_map(path: Path, plan: MapPlan) -> MapStore:
         OutputError: the store that is there is of another plan; or none can be made.
     """
     parameters = plan.parameters()
+    remove_folders(path)
     if path.exists():
         return _resumed(path, parameters)
     try:
-        made = Path(tempfile.mkdtemp(dir=path.parent, prefix=".copsense-", suffix=_SUFFIX))
-        try:
+        with new_folder(path) as made:
             made.chmod(0o777 & ~_mask())
             _lay_out(made, plan, parameters)
             made.rename(path)
-        finally:
-            shutil.rmtree(made, ignore_errors=True)
     except OSError as error:
         if path.exists():  # another process was faster
             return _resumed(path, parameters)
