@@ -8,6 +8,7 @@ Run: .venv/bin/python tools/pictures.py [NAME ...]   (all of them: some minutes)
 
 from __future__ import annotations
 
+import io
 import os
 import shlex
 import sys
@@ -154,6 +155,31 @@ def sole_sketch() -> Image.Image:
     return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
 
+def explorer() -> Image.Image:
+    """The explorer's window, the iCub leaning; it needs Chromium and playwright."""
+    from support.browser import chromium
+
+    from copsense import load_stance
+    from copsense.explore import Model, Setting, State
+    from copsense.explore.explorer import Explorer
+
+    state = State(("icub",), coordinates={"com_y": Setting(0.03, "m")})
+    with (
+        Explorer(Model(load_stance("icub")), state, meshes=False, light=True) as window,
+        chromium() as browser,
+    ):
+        page = browser.new_page(viewport={"width": 1280, "height": 860})
+        page.goto(window.url)
+        page.wait_for_function(
+            "window.__viserMutable && window.__viserMutable.messageQueue.length === 0"
+        )
+        page.wait_for_timeout(6000)
+        for note in page.locator(".mantine-Notification-closeButton").all():
+            note.click()  # that this browser has no graphics processor
+        page.wait_for_timeout(2000)
+        return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
 def keep(name: str, picture: Image.Image) -> None:
     """Write a picture, no larger than it may be."""
     path = IMAGES / f"{name}.webp"
@@ -170,7 +196,7 @@ def keep(name: str, picture: Image.Image) -> None:
 
 def main(names: list[str]) -> None:
     """Make the pictures of these names, or all."""
-    makers = {"film_end": last_frame, "slack": sole_sketch}
+    makers = {"film_end": last_frame, "slack": sole_sketch, "explorer": explorer}
     for name in names or [*makers, *GUIDES, *TUTORIALS]:
         if name in makers:
             keep(name, makers[name]())
