@@ -92,7 +92,7 @@ def test_a_com_has_three_entries(icub):
 
 
 def test_targets_are_finite_and_one_for_each_contact(icub):
-    with pytest.raises(InvalidInputError, match=r"1 targets for 2 contacts\. Give one each"):
+    with pytest.raises(InvalidInputError, match=r"1 target for 2 contacts\. Give one each"):
         copsense.solve_posture(icub, targets=icub.placements[:1])
     nowhere = pin.SE3(np.eye(3), np.array([np.nan, 0.0, 0.0]))
     with pytest.raises(InvalidInputError, match="the target of contact 'r_sole' is not finite"):
