@@ -63,6 +63,20 @@ def test_a_margin_is_positive_exactly_inside(figure, point):
         assert polygon.boundary_distance(point) >= -margin.distance - 1e-12
 
 
+@law(st.integers(3, 400), st.integers(0, 99))
+def test_what_hardly_stands_out_of_a_hull_is_left_out_once_and_for_all(count, seed):
+    detail, rng = 1e-6, np.random.default_rng(seed)
+    angles = rng.uniform(0, 2 * np.pi, count)
+    points = np.column_stack([0.1 * np.cos(angles), 0.05 * np.sin(angles)])
+    polygon = Polygon.hull(points, detail=detail)
+    assert Polygon.hull(polygon.vertices, detail=detail) == polygon
+    assert -polygon.margins(points).min() < 2 * detail
+    if len(polygon) > 2:
+        for i, vertex in enumerate(polygon.vertices):
+            without = Polygon(np.delete(polygon.vertices, i, axis=0))
+            assert without.boundary_distance(vertex) > detail
+
+
 @law(figures(), st.floats(0, 2 * np.pi), NUMBER)
 def test_a_cut_divides_the_area(figure, angle, offset):
     polygon, _ = figure

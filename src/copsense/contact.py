@@ -28,6 +28,9 @@ COMPONENTS: dict[str, tuple[int, ...]] = {
     "point": (0, 1, 2),
     "planar": (1, 2, 3),
 }
+# m: vertices of a sole that stand out by less are left out. Of two edges that are nearly one line,
+# as the hull of a mesh has them, rounding would say which is met.
+SOLE_DETAIL = 1e-6
 COMPONENT_NAMES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
@@ -107,6 +110,8 @@ class Contact(ShortRepr):
         offset: translation from the model's frame to the contact frame, in the model's frame [m].
         rotation: orientation of the contact frame in the model's frame (3 x 3).
         polygon: vertices (k x 2) of the sole in the contact frame, counter-clockwise [m], or None.
+            Points in any order are taken; those inside their hull, or that stand out of it by less
+            than a micrometre, are left out.
         plane: where the contact should lie, checked by the stance; None to take it as it is.
         friction: Coulomb coefficient, or None.
         torsional_friction: torsional coefficient [m], or None.
@@ -148,7 +153,8 @@ class Contact(ShortRepr):
         )
         object.__setattr__(self, "rotation", rotation)
         if self.polygon is not None:
-            outline = Polygon.hull(self.polygon, f"the polygon of contact {label!r}")
+            what = f"the polygon of contact {label!r}"
+            outline = Polygon.hull(self.polygon, what, SOLE_DETAIL)
             _require(
                 len(outline) >= 2,
                 f"the polygon of contact {label!r} is a single point. Give two or more, or make "

@@ -91,12 +91,13 @@ class Polygon:
             )
 
     @classmethod
-    def hull(cls, points: ArrayLike, what: str = "the polygon") -> Polygon:
+    def hull(cls, points: ArrayLike, what: str = "the polygon", detail: float = 0.0) -> Polygon:
         """The convex hull of points (k, 2) in any order.
 
         Args:
             points: x, y of each point [m].
             what: how an error calls them.
+            detail: what stands out by no more is left out, as in `merged` [m].
 
         Raises:
             InvalidInputError: not a finite (k, 2) array.
@@ -105,30 +106,35 @@ class Polygon:
         # Andrew's monotone chain. Rounded to the picometre: noise in x would put the points of an
         # upright edge out of order.
         ordered = [tuple(p) for p in np.unique(np.round(array, 12) + 0.0, axis=0)]
-        if len(ordered) < 3:
-            return cls(np.array(ordered).reshape(-1, 2))
-        return cls(np.array(_half(ordered) + _half(ordered[::-1])))
+        round_it = ordered if len(ordered) < 3 else _half(ordered) + _half(ordered[::-1])
+        hull = cls(np.array(round_it).reshape(-1, 2))
+        fewer = cls.merged(hull.vertices, detail) if detail else hull
+        return hull if len(fewer) == len(hull) else cls.hull(fewer.vertices, what)
 
     @classmethod
     def merged(cls, vertices: Float[np.ndarray, "k 2"], tolerance: float) -> Polygon:
         """A polygon of vertices in order, without those on the line of their neighbours.
 
-        Of a segment the end of the lesser x + y comes first.
+        The nearest to it is left out first, until each vertex stands out by more: merged again, the
+        polygon is the same. Of a segment the end of the lesser x + y comes first.
 
         Args:
             vertices: (k, 2), counter-clockwise, convex but for rounding; some may be equal [m].
             tolerance: how near to the segment of its neighbours a vertex is left out [m].
         """
-        corners, i, kept = vertices.tolist(), 0, 0
-        while kept < len(corners) and len(corners) > 1:
-            i %= len(corners)
-            # Its neighbours; of two points each is the other's only one.
-            around = corners[i - 1], corners[(i + 1) % len(corners)]
-            if segment_distance(corners[i], *around) <= tolerance:
-                del corners[i]
-                i, kept = max(i - 1, 0), 0
-            else:
-                i, kept = i + 1, kept + 1
+        corners: list[list[float]] = vertices.tolist()
+
+        def standing_out(i: int) -> float:
+            # Of two points each is the other's only neighbour.
+            here, before, after = (corners[j % len(corners)] for j in (i, i - 1, i + 1))
+            return segment_distance(here, before, after)
+
+        out = [standing_out(i) for i in range(len(corners))]
+        while len(corners) > 1 and (least := min(out)) <= tolerance:
+            i = out.index(least)
+            del corners[i], out[i]
+            for j in (i - 1, i):
+                out[j % len(out)] = standing_out(j)
         if len(corners) == 2:
             corners.sort(key=sum)
         return cls(np.array(corners).reshape(-1, 2))

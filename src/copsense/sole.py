@@ -10,7 +10,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from copsense.arrays import finite_number
-from copsense.contact import Contact
+from copsense.contact import SOLE_DETAIL, Contact
 from copsense.content import ShortRepr, freeze
 from copsense.errors import InvalidInputError, ModelLoadError
 from copsense.magnitudes import in_metres
@@ -32,7 +32,8 @@ class Sole(ShortRepr):
     Attributes:
         height: height of the lowest point over the frame, along the contact's z [m]; negative
             when the sole lies under the frame.
-        polygon: convex hull (k, 2) of the lowest millimetre, counter-clockwise, contact axes [m].
+        polygon: convex hull (k, 2) of the lowest millimetre, counter-clockwise, contact axes [m];
+            without vertices that stand out of it by less than a micrometre.
         upright: unit vector normal to the underside, away from the ground, contact axes, where the
             lowest millimetre is a mere edge of it; the contact's z where the sole lies flat.
         footprint: length and width of all that is fixed to the frame, seen from above [m].
@@ -96,7 +97,7 @@ def read_sole(
         )
     lowest = float(vertices[:, 2].min())
     sole = vertices[vertices[:, 2] <= lowest + thickness]
-    outline = Polygon.hull(sole[:, :2], f"the sole of contact {contact.name!r}")
+    outline = Polygon.hull(sole[:, :2], f"the sole of contact {contact.name!r}", SOLE_DETAIL)
     upright = _upright(vertices, outline)
     if len(outline) < 2:
         tilt = Sole(lowest, outline.vertices, upright).tilt

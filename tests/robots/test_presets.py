@@ -51,7 +51,8 @@ def test_icubs_sole_is_what_its_mesh_shows():
     robot = copsense.load_robot("icub")
     sole = copsense.sole.read_sole(robot, copsense.Contact("l_sole"))
     assert sole.height == pytest.approx(-0.0105, abs=5e-5)
-    assert len(sole.polygon) == 74
+    # Of the hull's 74 vertices seven are within 0.1 um of the line of others.
+    assert len(sole.polygon) == 67
     low, high = sole.polygon.min(axis=0), sole.polygon.max(axis=0)
     np.testing.assert_allclose(low, [-0.066, -0.0435], rtol=0, atol=5e-5)
     np.testing.assert_allclose(high, [0.129, 0.0515], rtol=0, atol=5e-5)
