@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from support import differences
-from support.one_sided import both_sides, lateral
+from support.one_sided import FORWARD, both_sides, lateral, with_vertex
 from support.random_cases import random_stance
 
 import copsense
 from copsense.cop import contact_cops
 from copsense.errors import InfeasibleError
-from copsense.limits import NO_LIMITS
+from copsense.limits import NO_LIMITS, Limits
 
 D, KAPPA = 0.14, 0.75  # the four-bar preset: rod [m], and the CoM's height over the legs'
 COP_ONLY = replace(NO_LIMITS, cop_margin=0.0)
@@ -171,6 +171,55 @@ def test_icubs_first_activation(icub, criterion, printed, side):
 def cop_slopes(stance, y, criterion):
     here, tangent = lateral(stance, y, stance.q)
     return copsense.cop_sensitivity(here, criterion).along(tangent)[:, 1]
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_icubs_cop_held_by_one_edge_slides_along_it(icub, side):
+    # The hull of its sole's mesh has edges there that are 1e-7 to 1e-6 rad apart.
+    com = np.add(icub.com, [-0.025, -0.054, -0.01])
+    slides_along(icub, com, Limits(), side, step=1e-4)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("out", [2e-7, 2e-6])
+def test_cop_slides_along_one_of_two_edges_nearly_in_line(icub, out, side):
+    # The vertex between them is 20 um from the centre of pressure.
+    com, limits = np.add(icub.com, [0.0, 0.05, 0.0]), Limits()
+    plain = with_vertex(icub, 0.0, 0.0)
+    at = copsense.solve_posture(plain, com=tuple(com), reference=icub.q).stance
+    cop = contact_cops(copsense.solve_equilibrium(at, copsense.minimum_torque(), limits))
+    stance = with_vertex(icub, cop[1, 0] + 2e-5, out)
+    assert len(stance.contacts[1].polygon) == (4 if out < 1e-6 else 5)
+    slides_along(stance, com, limits, side, step=1e-6)
+
+
+def slides_along(stance, com, limits, side, step):
+    """Compare slopes over CoM x with differences where one edge of a foot presses, alone."""
+    criterion = copsense.minimum_torque()
+    found = copsense.solve_posture(stance, com=tuple(com), reference=stance.q)
+    here = copsense.cop_sensitivity(found.stance, criterion, limits)
+    (pressing,) = here.equilibrium.active
+    assert not pressing.weak
+    assert pressing.kind == "cop"
+    slope = here.one_sided(found.tangents[:, 0], side=side)
+    at = [
+        contact_cops(
+            copsense.solve_equilibrium(
+                copsense.solve_posture(
+                    found.stance,
+                    com=tuple(np.add(com, [side * k * step, 0.0, 0.0])),
+                    reference=stance.q,
+                ).stance,
+                criterion,
+                limits,
+            )
+        )
+        for k in range(5)
+    ]
+    numeric = side * np.tensordot(FORWARD, at, axes=1) / step
+    np.testing.assert_allclose(slope, numeric, rtol=0, atol=1e-6 + 1e-12 / step)
+    foot = stance.contact_names.index(pressing.name.split(":")[0])
+    assert abs(slope[foot, 0]) > 0.3
 
 
 def test_saturated_cop_has_no_slope_along_the_edges_normal(icub):

@@ -26,6 +26,7 @@ from copsense.statics import with_tie_break
 
 CORNERS = [(-0.05, -0.03), (0.1, -0.03), (0.1, 0.03), (-0.05, 0.03)]
 TIED = minimum_torque(tie_break=minimum_wrench(1.0))
+LEVEL = copsense.minimum_tangential(minimum_wrench(0.5))  # zero on level ground: rounding is left
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +63,7 @@ def cases(corners, icub, count, seed):
     rng = np.random.default_rng(seed)
     for k in range(count):
         stance = icub if k % 3 == 0 else corners
-        criterion = TIED if k % 3 == 1 else idle_ankles(icub.robot)
+        criterion = {1: TIED, 3: LEVEL, 4: TIED}.get(k % 6, idle_ankles(icub.robot))
         Z = stance.admissible_motions
         here = copsense.posture.retract(stance, Z @ rng.normal(size=Z.shape[1]) * 0.08)
         torque = None if rng.random() < 0.6 else {"l_knee": rng.uniform(2, 8), "r_ankle_roll": 0.5}
@@ -92,11 +93,12 @@ def test_neither_the_criterion_nor_its_tie_break_can_be_had_for_less(corners, ic
         size = np.maximum(np.linalg.norm(A, axis=1), 1e-12)
         assert ((b - A @ f) / size).min() > -1e-9 * weight
         assert found.residual() < 1e-9 * weight
+        assert found.optimality() < 1e-8
         touched = (A / size[:, None])[(b - A @ f) / size < 1e-8 * weight]
         E = problem.base_map.T
         N = null_space(E.T)
         H, g = criterion.at(here).over_forces(problem)
-        scale = np.abs(H @ f - g).max()
+        scale = max(np.abs(H @ f - g).max(), 1e-6 * weight * np.abs(H).max())
         assert left_over(touched @ N, N.T @ (H @ f - g)) < 1e-7 * scale
         # The second cost: along F both ways, and along it only as far as the rows let go.
         F = null_space(np.vstack([E.T, H / np.abs(H).max()]), rcond=1e-9)

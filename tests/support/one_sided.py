@@ -1,5 +1,7 @@
 """One-sided finite differences along a lateral path, whose equilibria change their active set."""
 
+from dataclasses import replace
+
 import numpy as np
 
 import copsense
@@ -25,3 +27,9 @@ def both_sides(stance, y, value, step=2.5e-4):
         at = [value(lateral(here, y + sign * k * step, reference)[0]) for k in range(5)]
         sides.append(sign * np.tensordot(FORWARD, at, axes=1) / step)
     return sides
+
+
+def with_vertex(stance, x, out):
+    """Each foot on a rectangle, with a vertex at x that stands out of its left edge by that."""
+    sole = np.vstack([copsense.rectangle((-0.08, 0.12), (-0.03, 0.03)), [x, 0.03 + out]])
+    return stance.with_contacts([replace(c, polygon=sole) for c in stance.contacts])

@@ -22,6 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy.linalg
 from jaxtyping import Float, Int
 
 from copsense.arrays import array_property, owned
@@ -45,6 +46,8 @@ from copsense.statics.tied_optimum import Lexicographic
 
 _PRESSING = 1e-9  # multipliers, relative to the largest gradient, under which a row does not press
 _TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound
+_APART = 1e-9  # share that the pressing rows leave of a row that does not depend on them
+_ROUNDING = 1e-13  # slack, relative to the weight, that is none however little they leave
 _RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
 _CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that does not count
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
@@ -172,7 +175,8 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         """Largest violation of the QP's optimality conditions.
 
         Balance and limits in shares of the weight, stationarity and complementarity in shares of
-        the cost's gradient; recomputed from the stance.
+        the cost's gradient (of a millionth of what forces of the weight have, where it cancels);
+        recomputed from the stance. The QP is without the tie-break.
         """
         robot = self.stance.robot
         base = robot.in_drives(self.multipliers)[: robot.unactuated_nv]
@@ -284,7 +288,7 @@ def distance_to_change(
     optimum = (problem.program if problem.tie is None else problem.tie).optimum(pressing)
     multipliers = optimum.multipliers
     slack = problem.b - problem.A.dot(optimum.x)
-    gradient = max(float(np.abs(problem.H.dot(optimum.x) - problem.g).max()), 1e-300)
+    gradient = problem.program.gradient_size(optimum.x)
     if problem.tie is not None:
         pressed = np.abs(multipliers) * problem.scale > _PRESSING * gradient
         problem.check_followed(pressing, np.where(pressed, multipliers, 0.0))
@@ -380,15 +384,40 @@ class _Problem:
             raise InfeasibleError(error.violation, tuple(demands)) from None
         f, multipliers = found.x, found.multipliers
         slack = self.b - self.A.dot(f)
-        gradient = max(float(np.abs(self.H.dot(f) - self.g).max()), 1e-300)
-        touching = slack <= _TOUCHING * self.weight * self.scale
-        self.strong = multipliers * self.scale > _PRESSING * gradient
+        self.strong = multipliers * self.scale > _PRESSING * self.program.gradient_size(f)
         multipliers[~self.strong] = 0.0
         self.tied = np.isin(np.arange(len(self.b)), tied) & ~self.strong
         self.strong = self.strong | self.tied
-        self.weak = touching & ~self.strong
+        self.weak = self._touching(slack)
         slack[self.strong] = 0.0
         return f, found.equality, multipliers, slack
+
+    def _touching(self, slack: np.ndarray) -> np.ndarray:
+        """Which rows are on their bounds without pressing.
+
+        The slack is taken along what the pressing rows leave free: of an edge that is nearly the
+        line of one that presses, how far the centre of pressure is from where the two meet.
+        """
+        near = slack / (self.weight * self.scale)
+        touching = (near <= _TOUCHING) & ~self.strong
+        rows = np.flatnonzero(touching)
+        if not len(rows) or not np.any(self.strong):
+            return touching
+        # Coordinates in which the cost is |x|^2 / 2, as those of the compiled active set.
+        C = self.program.reduced_cost
+        if self.tie is not None:
+            free = self.program.null.T.dot(self.tie.free)
+            C = C + self.program.curvature[-1] * free.dot(free.T)
+        a = scipy.linalg.solve_triangular(
+            np.linalg.cholesky(C), self.program.null.T.dot(self.A.T), lower=True
+        )
+        a = a / np.maximum(np.linalg.norm(a, axis=0), 1e-300)
+        held, s, _ = np.linalg.svd(a[:, self.strong], full_matrices=False)
+        held = held[:, s > _APART]
+        share = np.linalg.norm(a[:, rows] - held.dot(held.T.dot(a[:, rows])), axis=0)
+        far = near[rows] > np.maximum(_TOUCHING * share, _ROUNDING)
+        touching[rows[far & (share > _APART)]] = False
+        return touching
 
     def equilibrium(
         self,

@@ -37,6 +37,9 @@ _SOLVED = 1e-12
 _DEPENDENT = 1e-9  # share of a row, or column of E, that the others must leave of it
 _ZERO = 1e-12  # norm of a row that limits nothing
 _FAR = 1e4  # units: no x is looked for farther out
+# A gradient is taken as no less than this share of what an x of the unit has: where all of it
+# cancels, as of tangential forces on flat ground, rounding is left, 1e-16 of that.
+_LEAST = 1e-6
 
 
 class NoPointError(CopsenseError):
@@ -122,18 +125,19 @@ class Program(ShortRepr):
         return self.known or RowSpace(self.E.T, max(self.E.shape) * np.finfo(float).eps)
 
     @cached_property
-    def _reduced_cost(self) -> Float[np.ndarray, "z z"]:
+    def reduced_cost(self) -> Float[np.ndarray, "z z"]:
+        """The cost over the null space."""
         return np.asarray(self.null.T.dot(self.H).dot(self.null))
 
     @cached_property
     def curvature(self) -> Float[np.ndarray, " z"]:
         """Eigenvalues of the cost over the null space, rising."""
-        return np.asarray(np.linalg.eigvalsh(self._reduced_cost))
+        return np.asarray(np.linalg.eigvalsh(self.reduced_cost))
 
     @property
     def modes(self) -> tuple[Float[np.ndarray, " z"], Float[np.ndarray, "z z"]]:
         """The same with their eigenvectors, coordinates over `null`."""
-        values, vectors = np.linalg.eigh(self._reduced_cost)
+        values, vectors = np.linalg.eigh(self.reduced_cost)
         return np.asarray(values), np.asarray(vectors)
 
     def solve(self) -> Optimum:
@@ -171,9 +175,7 @@ class Program(ShortRepr):
 
     def violation(self, x: np.ndarray, nu: np.ndarray, l: np.ndarray) -> float:
         """Largest violation of an optimality condition, in shares of the unit or the gradient."""
-        gradient = self.H @ x - self.g
-        floor = 1e-9 * self.unit * float(np.abs(self.H).max(initial=0.0))
-        size = max(float(np.abs(gradient).max()), floor, 1e-300)
+        gradient, size = self.H @ x - self.g, self.gradient_size(x)
         slack, pressure = (self.b - self.A @ x) / self.scale, l * self.scale
         parts = [
             np.abs(gradient + self.A.T @ l - self.E @ nu).max() / size,
@@ -184,6 +186,11 @@ class Program(ShortRepr):
         ]
         worst = float(max(parts))
         return worst if np.isfinite(worst) else np.inf
+
+    def gradient_size(self, x: np.ndarray) -> float:
+        """The largest entry of the cost's gradient, that multipliers are relative to."""
+        least = _LEAST * self.unit * float(np.abs(self.H).max(initial=0.0))
+        return max(float(np.abs(self.H @ x - self.g).max()), least, 1e-300)
 
     def hold(
         self, held: np.ndarray, g: np.ndarray, e: np.ndarray, b: np.ndarray
@@ -245,7 +252,7 @@ class Program(ShortRepr):
         """The program over the null space with rows of length one: H, h, A, b."""
         N, scale = self.null, self.scale
         return (
-            self._reduced_cost,
+            self.reduced_cost,
             N.T @ (self.H @ self.start - self.g),
             np.ascontiguousarray(self.A @ N / scale[:, None]),
             (self.b - self.A @ self.start) / scale,

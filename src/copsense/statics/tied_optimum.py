@@ -100,7 +100,7 @@ class Lexicographic:
         seen = np.setdiff1d(seen, strong)
         if not G.shape[1]:
             return TiedOptimum(first, np.zeros(0, dtype=int))
-        second = Program(
+        choice = Program(
             G.T @ self.H @ G,
             G.T @ (self.g - self.H @ first.x),
             np.zeros((G.shape[1], 0)),
@@ -108,10 +108,11 @@ class Lexicographic:
             rows[seen],
             slack[seen] / program.scale[seen],
             program.unit,
-        ).solve()
+        )
+        second = choice.solve()
         there = Optimum(first.x + G @ second.x, first.equality, first.multipliers, first.error)
-        slope = np.abs(G.T @ (self.H @ there.x - self.g)).max()
-        return TiedOptimum(there, seen[second.multipliers > pressing * slope])
+        least = pressing * choice.gradient_size(second.x)
+        return TiedOptimum(there, seen[second.multipliers > least])
 
     def _first(self, pressing: float) -> tuple[Optimum, Int[np.ndarray, " a"]]:
         """An optimum of the first cost, and the rows that press there."""
@@ -144,8 +145,8 @@ class Lexicographic:
 
     def _pressing(self, at: Optimum, pressing: float) -> Int[np.ndarray, " a"]:
         program = self.program
-        gradient = max(float(np.abs(program.H @ at.x - program.g).max()), 1e-300)
-        return np.flatnonzero(at.multipliers * program.scale > pressing * gradient)
+        least = pressing * program.gradient_size(at.x)
+        return np.flatnonzero(at.multipliers * program.scale > least)
 
     def _polished(self, near: Optimum, strong: Int[np.ndarray, " a"]) -> Optimum:
         """The same with the last proximal step's own pull taken out."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 from support.grounds import off_centre, with_hand
+from support.one_sided import with_vertex
 from support.random_cases import Case
 from support.raw_qp import raw_problem
 from support.stances import CASES, postures, served, weighed
@@ -229,6 +230,20 @@ def test_both_sides_of_a_change_are_the_references(icub):
     assert np.abs(gains[0, 0, 0] - gains[0, 0, 1]).max() > 0.1
     with pytest.raises(copsense.errors.InvalidInputError, match="has no gains"):
         kernel.one_sided_gains(np.vstack([q, q]), at)
+
+
+def test_an_edge_nearly_in_line_with_one_that_presses_is_not_touched(icub):
+    com, criterion = tuple(np.add(icub.com, [0.0, 0.05, 0.0])), copsense.minimum_torque()
+    q = copsense.solve_posture(with_vertex(icub, 0.0, 0.0), com=com).stance.q
+    x = BatchKernel(with_vertex(icub, 0.0, 0.0), [criterion], Limits()).evaluate(q[None]).cops
+    for beside in (2e-5, -2e-5):
+        stance = with_vertex(icub, x[0, 0, 1, 0] + beside, 2e-6)
+        found = BatchKernel(stance, [criterion], Limits()).evaluate(q[None]).limits
+        (pressing,) = found.active(0, 0)
+        assert pressing.kind == "cop"
+        assert found.touching[0, 0] == 0
+        expected = copsense.solve_equilibrium(stance.at(q), criterion, Limits())
+        assert [a.name for a in expected.active] == [pressing.name]
 
 
 def test_a_hand_that_would_have_to_pull_is_left_without_load(icub):

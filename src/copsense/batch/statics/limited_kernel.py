@@ -23,6 +23,7 @@ from copsense.batch.statics.active_set import (
     nearest,
     optimum,
     relax,
+    write_row,
 )
 from copsense.batch.statics.com_gains import com_gains, com_motions, margins
 from copsense.batch.statics.criteria import KernelCriteria
@@ -34,6 +35,8 @@ from copsense.batch.statics.limit_offsets import LimitOffsets
 from copsense.batch.statics.limit_outputs import LimitOut, begin_row, row_margins, write_lane
 from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNLOADED
 from copsense.batch.statics.limited_statics import (
+    APART,
+    ROUNDING,
     TOUCHING,
     Within,
     gradient_size,
@@ -244,22 +247,42 @@ def _settle(at: Within, lane: int, row: int, index: int, pack: Pack, found: Limi
 
 @compiled
 def _touching(at: Within, lane: int, held: Any, q: int) -> int:
-    """How many rows are on their bounds and do not press."""
+    """How many rows are on their bounds and do not press, as the reference says it."""
     feet, offset, _limits, rows, _criteria, W, p = at
-    touching, tolerance = -q, TOUCHING * feet.weight
+    touching, tolerance = 0, TOUCHING * feet.weight
     rc = len(rows.bound)
     for i in range(len(p.slack)):
         if p.slack[i] * p.inverse[i] <= tolerance and (i >= rc or rows.public[i] >= 0):
-            touching += 1
-    for k in range(q):  # of those that press, some may be farther off
-        if p.slack[held[k]] * p.inverse[held[k]] > tolerance:
-            touching += 1
+            presses = False
+            for k in range(q):
+                presses = presses or held[k] == i
+            if not presses and _meets(at, i, q):
+                touching += 1
     for i in feet.rest:
         torque = get(W, offset.torque + i, lane)
         for sign in (1.0, -1.0):
             if rows.row[i] >= 0 and rows.torque[i] - sign * torque <= tolerance:
                 touching += 1
     return touching
+
+
+@compiled
+def _meets(at: Within, row: int, q: int) -> bool:
+    """Whether a row's slack is none along what the q pressing rows leave free."""
+    feet, _offset, _limits, rows, _criteria, _W, p = at
+    write_row(rows, p, row, feet.unknowns, False)
+    length, left = 0.0, 0.0
+    for j in range(feet.unknowns):
+        along = 0.0
+        for i in range(feet.unknowns):
+            along += p.Q[i, j] * p.a[i]
+        length += along * along
+        if j >= q:
+            left += along * along
+    if left <= APART * APART * length:
+        return True
+    near = p.slack[row] * p.inverse[row] / feet.weight
+    return near <= max(TOUCHING * np.sqrt(left / length), ROUNDING)
 
 
 @compiled

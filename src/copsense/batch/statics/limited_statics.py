@@ -24,6 +24,8 @@ from copsense.batch.workspace import Offsets
 
 PRESSING = 1e-9  # multipliers, relative to the largest gradient, that do not press, as in `statics`
 TOUCHING = 1e-9  # slack, relative to the weight, under which a row is on its bound, likewise
+APART = 1e-9  # share that the pressing rows leave of a row apart from them, likewise
+ROUNDING = 1e-13  # slack, relative to the weight, that is none however little they leave, likewise
 
 
 class Within(NamedTuple):
