@@ -8,10 +8,10 @@ joint limits. Every kind of criterion that the kernel serves is evaluated by bot
 table of the largest difference of a posture's quantity, relative to the largest entry of that
 quantity there; exits with 1 if one is over 1e-9.
 
-With `--limits` the same within limits that press on about half of the postures, on five robots:
-wrenches, derivatives and multipliers, both sides of the changes found between neighbours, every
-optimum's violation of its conditions, and for every infeasible posture and a fifth of the others a
-linear program that says whether it has any wrench within the limits.
+With `--limits` the same within limits that press on about half of the postures, on five robots, one
+of them with its hands too: wrenches, derivatives and multipliers, both sides of the changes found
+between neighbours, every optimum's violation of its conditions, and for every infeasible posture
+and a fifth of the others a linear program that says whether it has any wrench within the limits.
 """
 
 import argparse
@@ -180,7 +180,14 @@ def compare(name, start, count):
     return name, len(stance.contacts), count, len(left), len(found.reasons), errors
 
 
-FIVE = ("icub, flat", "talos, slopes", "g1, slopes", "human, flat", "romeo, flat")
+WITHIN = (
+    "icub, flat",
+    "talos, slopes",
+    "g1, slopes",
+    "human, flat",
+    "romeo, flat",
+    "icub, hands on wall and table",
+)
 LIMITED = (*WHAT[:-1], "multipliers", "one-sided", "at changes")
 COUNTED = ("pressed", "infeasible", "touching", "wrong", "wrong at changes")
 EXACT = 1e-9  # weights: relaxation, of rows of norm one, that is none
@@ -322,9 +329,9 @@ def compare_within(name, start, count):
 
 
 def main_within(arguments):
-    """Compare five robots within limits in shares, and print the table."""
-    each = -(-arguments.count // len(FIVE))
-    shares = [(n, s, min(200, each - s)) for n in FIVE for s in range(0, each, 200)]
+    """Compare five robots, one with its hands too, within limits in shares, and print the table."""
+    each = -(-arguments.count // len(WITHIN))
+    shares = [(n, s, min(200, each - s)) for n in WITHIN for s in range(0, each, 200)]
     rows = {}
     with ProcessPoolExecutor(arguments.jobs) as pool:
         answers = pool.map(compare_within, *zip(*shares, strict=True))
@@ -370,7 +377,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--count", type=int, default=10000, help="postures in all")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
-    parser.add_argument("--limits", action="store_true", help="on five robots, within limits")
+    parser.add_argument("--limits", action="store_true", help="within limits")
     arguments = parser.parse_args()
     if arguments.limits:
         return main_within(arguments)
