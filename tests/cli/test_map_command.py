@@ -11,7 +11,8 @@ from support.commands import copsense as run
 
 import copsense
 from copsense.cli.map_command import read_axes
-from copsense.maps import load_map
+from copsense.errors import UnreachablePostureError
+from copsense.maps import Axis, Grid, load_map, map_summary
 from copsense.maps.chunks import ChunkEvaluator
 
 GRID = ("map", "icub", "--over", "com_y=-0.05:0.05:9", "--over", "roll=-4:4:5", "--over")
@@ -58,6 +59,9 @@ def test_the_same_command_again_only_tells_and_draws(made):
     assert f"CoM travel: none at {none} postures ({none / known:.1%}), worst at com_y" in answer.out
     assert "_sole off its sole); median" in answer.out
     assert "deg" in answer.out
+    assert "CoM gain: worst" in answer.out
+    # In Python the summary prints the same, also of a map that lay there.
+    assert answer.out == f"{map_summary(folder / 'm.zarr')}\nwritten: {folder / 'm.zarr'}\n"
     assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
 
 
@@ -158,6 +162,29 @@ def test_of_points_the_travel_is_that_until_the_first_unloads(tmp_path, stance_o
     ).verdict
     assert f"may move {distance:.1f} mm before {words[4]} unloads." in verdict
     assert "inf" not in answer.out
+    assert "CoM gain" not in answer.out  # centres of pressure of points stand still
+
+
+def test_heights_meant_from_the_stances_own_are_rejected(tmp_path, icub):
+    outputs = ("--samples", 2, "--output", tmp_path / "m.zarr")
+    error = run("map", "icub", "--over", "com_z=-20mm:0mm", *outputs).error
+    own = round(icub.com[2] * 1e3)
+    assert "com_z is the height over the world's origin, -20 to 0 mm is at the feet" in error
+    assert f"the stance has {own} mm. Give heights, such as" in error
+    assert f"--over com_z={own - 20}mm:{own}mm." in error
+    assert not (tmp_path / "m.zarr").exists()
+    down = Grid((Axis("base_z", -0.02, 0.02, 2),))
+    with pytest.raises(UnreachablePostureError, match="base_z is the height"):
+        copsense.map_postures(icub, down, [copsense.minimum_torque()], tmp_path / "m.zarr")
+
+
+def test_a_map_of_which_nothing_was_reached_says_what_the_stance_has(tmp_path, icub):
+    path = tmp_path / "m.zarr"
+    answer = run("map", "icub", "--over", "l_elbow=170:171:2", "--output", path)
+    assert answer.code == 1
+    assert "joint l_elbow over its limit by 64 deg" in answer.out  # of 106
+    assert "and the stance has l_elbow +45.00 deg. " in answer.err
+    assert answer.err.endswith(f"The store holds nothing else: rm -r {path}\n")
 
 
 def test_the_command_says_that_it_compiles_first(tmp_path, monkeypatch):

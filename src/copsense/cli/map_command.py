@@ -25,10 +25,9 @@ from copsense.cli.uncertainty_option import read_uncertainty, uncertainty_option
 from copsense.cli.units import read_quantity
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.extras import require
-from copsense.listing import counted
 
 if TYPE_CHECKING:
-    from copsense.maps import Axis, CriterionSummary, MapSummary
+    from copsense.maps import Axis, MapSummary
     from copsense.maps.sampling import Sampling
     from copsense.stance import Stance
 
@@ -132,9 +131,9 @@ def map_command(
 
     from copsense.batch import BatchKernel, PostureChart
     from copsense.files import check_output
-    from copsense.freedom import com_span
     from copsense.maps import MapPlan
-    from copsense.maps.heights import height_advice
+    from copsense.maps.heights import check_heights, height_advice
+    from copsense.maps.map_lines import map_lines, place_text
     from copsense.maps.map_statistics import summarise
     from copsense.maps.mapping import fill_map
     from copsense.maps.sampling import sampling_of
@@ -153,6 +152,7 @@ def map_command(
     reject_varied([text.partition("=")[0] for text in over], options)
     stance = read_stance(robot, **options)
     sampling = sampling_of(read_axes(stance, over), samples, seed, sequence)
+    check_heights(stance, sampling)  # before a minute of compiling
     pair = _pair(plot_over, sampling.names)
     plan = MapPlan(stance, tuple(chosen), sampling, within, chunk, configurations, unsure)
     echo_notes(note for note in plan.notes if note not in stance.robot.notes)
@@ -202,7 +202,14 @@ def map_command(
     if as_json:
         echo_json(summary.to_dict() | {"plot": plot, "notes": list(plan.notes)})
     else:
-        _print(summary, plot, com_span(stance))
+        click.echo("\n".join(map_lines(summary)))
+        click.echo(f"written: {summary.path}" + (f", {plot}" if plot else ""))
+    if all(row.counts["unreachable"] == summary.postures for row in summary.criteria.values()):
+        own = dict(zip(sampling.names, PostureChart(stance, sampling.names).values, strict=True))
+        _note(
+            f"no posture was reached. Coordinates are absolute, and the stance has "
+            f"{place_text(own, summary)}. The store holds nothing else: rm -r {output}"
+        )
     click.get_current_context().exit(1 if _failures(summary) else 0)
 
 
@@ -290,66 +297,3 @@ def _draw(
 def _failures(summary: MapSummary) -> int:
     kinds = ("unreachable", "rejected", "unsolved")
     return sum(row.counts[kind] for row in summary.criteria.values() for kind in kinds)
-
-
-def _print(summary: MapSummary, plot: str | None, span: float) -> None:
-    over = ", ".join(summary.coordinates)
-    click.echo(f"{summary.robot}: {counted(summary.postures, 'posture')} over {over}")
-    units = dict(zip(summary.coordinates, summary.units, strict=True))
-    printed: set[tuple[str, int]] = set()  # a posture out of reach is so for every criterion
-    for name, row in summary.criteria.items():
-        shares = ", ".join(
-            f"{count / summary.postures:.1%} {kind}" for kind, count in row.counts.items() if count
-        )
-        click.echo(f"  {name}: {shares}")
-        for status, first in row.failed.items():
-            if (status, first.posture) not in printed:
-                reason = first.reason.removeprefix(f"{status}: ")
-                click.echo(f"    {status}, first at {_place(first.coordinates, units)}: {reason}")
-            printed.add((status, first.posture))
-        if unloaded := row.counts_within.get("unloaded", 0):
-            click.echo(
-                f"    within the limits: a contact is left without load at "
-                f"{counted(unloaded, 'posture')} ({unloaded / row.counts['evaluated']:.1%})"
-            )
-        if row.worst_travel:
-            click.echo(f"    CoM travel: {_travel(row, units, span)}")
-        if row.worst_gain:
-            gain = row.worst_gain[0]
-            click.echo(
-                f"    CoM gain: worst {gain.value:.2f} at {_place(gain.coordinates, units)}; "
-                f"median {row.gain_percentiles[50.0]:.2f}"
-            )
-    click.echo(f"written: {summary.path}" + (f", {plot}" if plot else ""))
-
-
-def _travel(row: CriterionSummary, units: dict[str, str], span: float) -> str:
-    """The worst travel and what ends it, and the median; the CoM goes nowhere beyond its span."""
-    worst, half = row.worst_travel[0], _length(row.travel_percentiles[50.0], span)
-    if not worst.contact or worst.value > span:
-        return "no contact tips or unloads, to first order, wherever the CoM can go"
-    what = {
-        "tips": f"{worst.contact} tips over edge {worst.tipping_edge}",
-        "off its sole": f"CoP of {worst.contact} off its sole",
-    }.get(worst.event, f"{worst.contact} {worst.event}")
-    where = f"{_place(worst.coordinates, units)} ({what})"
-    if worst.value >= 0:
-        return f"worst {worst.value * 1e3:+.1f} mm at {where}; median {half}"
-    count = row.without_travel
-    return (
-        f"none at {counted(count, 'posture')} ({count / row.counts['evaluated']:.1%}), "
-        f"worst at {where}; median {half}"
-    )
-
-
-def _length(travel: float, span: float) -> str:
-    if travel > span or travel == math.inf:
-        return "unlimited"
-    return f"{travel * 1e3:+.1f} mm" if travel >= 0 else "none"
-
-
-def _place(coordinates: Any, units: dict[str, str]) -> str:
-    return ", ".join(
-        f"{name} {math.degrees(v):+.2f} deg" if units[name] == "rad" else f"{name} {v:+.4f} m"
-        for name, v in coordinates.items()
-    )

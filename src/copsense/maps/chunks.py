@@ -7,7 +7,6 @@ import numpy as np
 from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
 from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNANSWERED, UNLOADED
 from copsense.errors import CopsenseError
-from copsense.magnitudes import check_angle
 from copsense.maps.columns import (
     EVALUATED,
     INFEASIBLE,
@@ -21,12 +20,13 @@ from copsense.maps.columns import (
     fill_value,
     limit_kinds,
 )
+from copsense.maps.heights import check_heights
 from copsense.maps.map_plan import MapPlan
 from copsense.maps.reduction import reduce_chunk
 from copsense.maps.sampling import Sampling
 from copsense.maps.store import MapStore
 from copsense.margins import margin_table
-from copsense.reach import SWEPT, check_within_reach
+from copsense.reach import check_coordinate
 from copsense.sensitivity import cop_sensitivity
 from copsense.uncertainty import Uncertainty, robust_com_travel
 
@@ -180,14 +180,7 @@ def _largest_singular_value(G: np.ndarray) -> np.ndarray:
 
 def _check_magnitudes(chart: PostureChart, sampling: Sampling) -> None:
     """Reject coordinates that only another unit explains: no posture of theirs would be reached."""
-    robot = chart.stance.robot
     for axis, unit, own in zip(sampling.axes, chart.units, chart.values.tolist(), strict=True):
         for end in (axis.start, axis.stop):
-            if axis.name in robot.joint_names:
-                robot.checked_position(axis.name, end)
-            elif unit == "m":
-                check_within_reach(
-                    robot, end - own, f"{axis.name}, from the stance's own,", SWEPT, end
-                )
-            else:
-                check_angle(end, axis.name)
+            check_coordinate(chart.stance.robot, axis.name, unit, own, end)
+    check_heights(chart.stance, sampling)

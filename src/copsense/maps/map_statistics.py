@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from copsense.content import ShortRepr, freeze
 from copsense.json_data import json_data
 from copsense.maps.columns import EVALUATED, FLAGS, STATE_WITHIN, STATUS
+from copsense.maps.map_lines import map_lines
 from copsense.maps.reduction import QUANTITIES, Part, Percentiles, fold
 from copsense.maps.store import MapStore
 
@@ -108,6 +110,8 @@ class MapSummary(ShortRepr):
         chunks: in all.
         chunks_done: evaluated so far; the numbers are of these.
         criteria: by name.
+        com_span: a length that the CoM's travel cannot exceed with the contacts in place [m];
+            infinite where it is not known.
     """
 
     path: str
@@ -118,10 +122,15 @@ class MapSummary(ShortRepr):
     chunks: int
     chunks_done: int
     criteria: Mapping[str, CriterionSummary]
+    com_span: float = math.inf
 
     def __post_init__(self) -> None:
         """Own the mapping."""
         freeze(self, "criteria")
+
+    def __str__(self) -> str:
+        """What ``copsense map`` prints."""
+        return "\n".join(map_lines(self))
 
     @property
     def complete(self) -> bool:
@@ -223,6 +232,7 @@ def summarise(store: MapStore, progress: Callable[[int], object] | None = None) 
         len(store.done()),
         sum(end - start for start, end in runs),
         criteria,
+        store.com_span,
     )
 
 

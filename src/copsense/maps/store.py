@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import warnings
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -25,6 +26,7 @@ from copsense._version import __version__
 from copsense.errors import CopsenseError, OutputError
 from copsense.extras import require
 from copsense.files import check_output, checked_path
+from copsense.freedom import com_span
 from copsense.maps.columns import (
     EVALUATED,
     FLAGS,
@@ -44,6 +46,7 @@ from copsense.maps.reduction import QUANTITIES, WORST, Part
 from copsense.provenance import differences, digest, worded
 
 _PARAMETERS = "copsense_map"  # the attribute by which a store is known
+_SPAN = "com_span"  # [m]; where it is finite
 _SUFFIX = ".zarr"
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -90,6 +93,11 @@ class MapStore:
     def contacts(self) -> tuple[str, ...]:
         """Names of the contacts."""
         return tuple(c["name"] for c in self.parameters["contacts"])
+
+    @property
+    def com_span(self) -> float:
+        """A length that the CoM's travel cannot exceed [m]; infinite where it is not recorded."""
+        return float(self._group.attrs.get(_SPAN, math.inf))
 
     def units(self, column: str) -> str:
         """Units of a column."""
@@ -298,6 +306,7 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
     zarr, count = _zarr(), len(plan.sampling)
     coordinates = coordinate_columns(plan)
     names = labels(plan)
+    span = com_span(plan.stance)
     sizes = {dim: len(found) for dim, found in names.items()} | {"posture": count}
     group = zarr.create_group(
         path,
@@ -308,6 +317,7 @@ def _lay_out(path: Path, plan: MapPlan, parameters: dict[str, Any]) -> None:
             "robot": plan.stance.robot.name,
             "over": list(coordinates),
             "coordinates": " ".join(coordinates),  # as xarray reads it
+            **({_SPAN: span} if math.isfinite(span) else {}),
             "digest": digest(parameters),
             _PARAMETERS: json.dumps(parameters),
             "conventions": "SI units, radians, world z up; float32 but for coordinates and "
