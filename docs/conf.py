@@ -211,12 +211,18 @@ OUTPUT = re.compile(
     r'(<div class="highlight-(?:console|text)[^"]*)("><div class="highlight"><pre>)(.*?)(</pre>)',
     flags=re.DOTALL,
 )
+CELL = re.compile(r"<td\b.*?</td>", flags=re.DOTALL)
+NAME = re.compile(r'(?<=<span class="pre">)[^<]+')
+BREAK = re.compile(r"(?<=[A-Za-z0-9])([._/:])(?=[A-Za-z0-9\[])")
 COLUMNS = re.compile(r"\S {2,}\S")
 ON_A_PHONE = 46  # columns of output beside its margins
 
 
-def wrap_sentences(app: Sphinx, page: str, template: str, context: dict, doctree: object) -> None:
-    """Mark the long lines of outputs that have no columns, and outputs whose columns are wide."""
+def fit_in_width(app: Sphinx, page: str, template: str, context: dict, doctree: object) -> None:
+    """Mark the long lines of outputs that have no columns, and outputs whose columns are wide.
+
+    Names in tables may break after a dot, an underscore and the like.
+    """
 
     def marked(block: re.Match) -> str:
         lines, wide = [], False
@@ -228,8 +234,11 @@ def wrap_sentences(app: Sphinx, page: str, template: str, context: dict, doctree
             lines.append(f'<span class="sentence">{line}</span>' if long and not table else line)
         return block[1] + " wide-output" * wide + block[2] + "\n".join(lines) + block[4]
 
+    def with_breaks(cell: re.Match) -> str:
+        return NAME.sub(lambda name: BREAK.sub(r"\1<wbr>", name[0]), cell[0])
+
     if "body" in context:
-        context["body"] = OUTPUT.sub(marked, context["body"])
+        context["body"] = CELL.sub(with_breaks, OUTPUT.sub(marked, context["body"]))
 
 
 def write_scenes(app: Sphinx, error: Exception | None) -> None:
@@ -250,7 +259,7 @@ def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings, and make pages in 3-D."""
     app.connect("build-finished", write_scenes)
     app.connect("source-read", write_tables)
-    app.connect("html-page-context", wrap_sentences)
+    app.connect("html-page-context", fit_in_width)
     app.connect("autodoc-process-docstring", keep_sentence, priority=100)
     app.connect("autodoc-process-signature", name_aliases)
     app.add_html_math_renderer("mathml", (write_inline_math, None), (write_block_math, None))

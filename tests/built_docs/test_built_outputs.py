@@ -13,3 +13,9 @@ def test_long_sentences_of_outputs_wrap_and_their_columns_do_not(built):
     assert not any("sentence" in before for before in rows)
     assert "wide-output" in page
     assert "wide-output" not in (built / "install.html").read_text("utf-8")
+
+
+def test_names_in_tables_break_after_dots_and_are_whole_in_the_text(built):
+    page = (built / "api.html").read_text("utf-8")
+    assert "copsense.<wbr>load_<wbr>stance" in page
+    assert "<wbr>" not in re.sub(r"<td\b.*?</td>", "", page, flags=re.DOTALL)
