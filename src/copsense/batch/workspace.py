@@ -48,9 +48,9 @@ class Offsets(NamedTuple):
         L: inverse of the Cholesky factor of 1 + C'C (6, 6).
         level: gradient of the CoM moment along the two level directions, projected (2, nv).
         unknown: y or its adjoint (r,).
-        six: a projection's coefficients (2, 6).
-        felt: a gradient on the support joints (ns,).
-        along: a gradient's part along Q, or a motion's along Y (r + 6,).
+        six: coefficients of two projections (2, 2, 6).
+        felt: gradients on the support joints (2, ns), then memory for another (ns,).
+        along: two gradients' parts along Q (2, r), or a motion's along Y (r + 6,).
         load: b, what the contacts' wrenches sum up to (6,).
         nothing: zeros (6,).
         wrench: phi of each contact (nc, 6).
@@ -185,9 +185,9 @@ def workspace_offsets(layout: RobotLayout, nq: int) -> Offsets:
         "L": 36,
         "level": 2 * nv,
         "unknown": r,
-        "six": 12,
-        "felt": ns,
-        "along": r + 6,
+        "six": 24,
+        "felt": 3 * ns,
+        "along": max(r + 6, 2 * r),
         "load": 6,
         "nothing": 6,
         "wrench": 6 * nc,

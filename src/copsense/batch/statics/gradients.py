@@ -103,7 +103,7 @@ def torque_gradients(
 
     With `limits` those that press are held, whatever the criterion.
     """
-    nv = len(tree.parent) + 5
+    nv, ns = len(tree.parent) + 5, len(feet.support)
     _lever_arms(tree, feet, offset, W)
     _multipliers(feet, offset, W, criteria, index, limits)
     for k in range(len(feet.body)):
@@ -111,15 +111,16 @@ def torque_gradients(
             _stand_still(offset, W, k, nv)
         for output in range(LOAD if feet.point[k] else 0, LOAD + 1 if gains else LOAD):
             at = offset.load_gradient if output == LOAD else offset.gradient + nv * (2 * k + output)
+            felt = offset.felt + ns * output
             _adjoint(feet, offset, W, criteria, index, k, output, limits)
-            _sweep(tree, feet, offset, W, at)
+            _sweep(tree, feet, offset, W, at, felt)
             if output == LOAD:
                 # The motions it meets are admissible: nothing has to be projected.
-                for t in range(len(feet.support)):
-                    store(W, at + 5 + feet.support[t], load(W, offset.felt + t))
+                for t in range(ns):
+                    store(W, at + 5 + feet.support[t], load(W, felt + t))
                 along_motions(offset, W, at, offset.load_gain + 2 * k, nv)
-            else:
-                project(feet, offset, W, at, offset.felt)
+        if not feet.point[k]:
+            project(feet, offset, W, offset.gradient + 2 * nv * k)
 
 
 @compiled
@@ -216,13 +217,13 @@ def _adjoint(
         for h in feet.order[: feet.held]:
             more = _shared(feet, offset, W, h, _cost(offset, W, criteria, index, h))
             w = add3(w, more[1])
+    change = offset.felt + 2 * ns
     for t in range(ns):
-        i, mu = feet.support[t], offset.inner_group + 6 * feet.group[t]
-        s = offset.screw + 6 * i
-        change = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
-        store(W, offset.felt + t, change)
+        s, mu = offset.screw + 6 * feet.support[t], offset.inner_group + 6 * feet.group[t]
+        power = dot3(load3(W, s), load3(W, mu)) + dot3(load3(W, s + 3), load3(W, mu + 3))
+        store(W, change + t, power)
     for t in range(ns):
-        rate = -weigh(W, criteria.torque[index], criteria.torque_reach[index], t, offset.felt)
+        rate = -weigh(W, criteria.torque[index], criteria.torque_reach[index], t, change)
         if limits is not None:
             for j in range(r):
                 response = load(W, limits.torque_response + r * t + j)
@@ -291,8 +292,11 @@ def _leave(limits: LimitOffsets, offset: Offsets, W: Any, r: int) -> None:
 
 
 @compiled
-def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int) -> None:
-    """One output's gradient (nv,) at row `at`, base in world axes, not yet projected."""
+def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int, felt: int) -> None:
+    """One output's gradient (nv,) at row `at`, base in world axes, not yet projected.
+
+    Its entries of the support joints go to `felt`.
+    """
     ns = len(feet.support)
     g = (splat(tree.gravity[0]), splat(tree.gravity[1]), splat(tree.gravity[2]))
     base = load3(W, offset.twist)
@@ -301,7 +305,7 @@ def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int) -> None:
         i, up = feet.support[t], feet.anchor[feet.support[t]]
         omega = load3(W, offset.turning + 3 * up) if up >= 0 else base
         rate = load(W, offset.rate + t)
-        store(W, offset.felt + t, -dot3(omega, load3(W, offset.weight + 3 * i)))
+        store(W, felt + t, -dot3(omega, load3(W, offset.weight + 3 * i)))
         if tree.kind[i] != PRISMATIC:
             omega = add3(omega, scale3(rate, load3(W, offset.screw + 6 * i + 3)))
         store3(W, offset.turning + 3 * t, omega)
@@ -318,7 +322,7 @@ def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int) -> None:
         s, T = offset.screw + 6 * i, offset.pull + 6 * t
         F, M = load3(W, T), load3(W, T + 3)
         power = dot3(load3(W, s), F) + dot3(load3(W, s + 3), M)
-        store(W, offset.felt + t, load(W, offset.felt + t) + power)
+        store(W, felt + t, load(W, felt + t) + power)
         above = offset.pull + 6 * up if up >= 0 else at
         store3(W, above, add3(load3(W, above), F))
         store3(W, above + 3, add3(load3(W, above + 3), M))

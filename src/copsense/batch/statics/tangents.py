@@ -26,7 +26,8 @@ def span(feet: Feet, offset: Offsets, W: Any) -> None:
         c = offset.C + ns * j
         for t in range(ns):
             store(W, c + t, load(W, offset.held_row + 6 * t + j))
-        _remove(feet, offset, W, c)
+    for j in range(0, 6, 2):
+        _remove(feet, offset, W, offset.C + ns * j)
     for i in range(6):
         for j in range(i + 1):
             s = splat(1.0 if i == j else 0.0)
@@ -48,61 +49,85 @@ def span(feet: Feet, offset: Offsets, W: Any) -> None:
 
 @compiled
 def _remove(feet: Feet, offset: Offsets, W: Any, g: int) -> None:
-    """g -= Q Q' g. Q is orthonormal: no product has to wait for another."""
+    """g -= Q Q' g of two gradients, one after the other. Q is read once for both.
+
+    It is orthonormal: no product has to wait for another.
+    """
     ns, r = len(feet.support), feet.unknowns
+    h, more = g + ns, offset.along + r
     for k in range(r):
         q = offset.Q + ns * k
-        c = load(W, q) * load(W, g)
+        x = load(W, q)
+        c, d = x * load(W, g), x * load(W, h)
         for t in range(1, ns):
-            c = c + load(W, q + t) * load(W, g + t)
+            x = load(W, q + t)
+            c, d = c + x * load(W, g + t), d + x * load(W, h + t)
         store(W, offset.along + k, c)
+        store(W, more + k, d)
     for t in range(ns):
-        s = load(W, g + t)
+        c, d = load(W, g + t), load(W, h + t)
         for k in range(r):
-            s = s - load(W, offset.along + k) * load(W, offset.Q + ns * k + t)
-        store(W, g + t, s)
+            x = load(W, offset.Q + ns * k + t)
+            c, d = c - load(W, offset.along + k) * x, d - load(W, more + k) * x
+        store(W, g + t, c)
+        store(W, h + t, d)
 
 
 @compiled
-def project(feet: Feet, offset: Offsets, W: Any, gradient: int, felt: int) -> None:
-    """Project a gradient (nv,), base part in world axes; `felt` holds it on the support joints."""
-    ns = len(feet.support)
-    _remove(feet, offset, W, felt)
-    y, z = offset.six, offset.six + 6
+def project(feet: Feet, offset: Offsets, W: Any, gradient: int) -> None:
+    """Project two gradients (2, nv), base part in world axes, one after the other.
+
+    `felt` holds them on the support joints.
+    """
+    ns, nv = len(feet.support), len(feet.anchor) + 5
+    g, h, other = offset.felt, offset.felt + ns, gradient + nv
+    _remove(feet, offset, W, g)
+    y, z = offset.six, offset.six + 12  # of both, then for both
     for i in range(6):
-        s = load(W, gradient + i)
+        c, d = load(W, gradient + i), load(W, other + i)
         for t in range(ns):
-            s = s + load(W, offset.C + ns * i + t) * load(W, felt + t)
-        store(W, y + i, s)
+            x = load(W, offset.C + ns * i + t)
+            c, d = c + x * load(W, g + t), d + x * load(W, h + t)
+        store(W, y + i, c)
+        store(W, y + 6 + i, d)
     for i in range(6):
-        s = load(W, offset.L + 6 * i) * load(W, y)
+        x = load(W, offset.L + 6 * i)
+        c, d = x * load(W, y), x * load(W, y + 6)
         for k in range(1, i + 1):
-            s = s + load(W, offset.L + 6 * i + k) * load(W, y + k)
-        store(W, z + i, s)
+            x = load(W, offset.L + 6 * i + k)
+            c, d = c + x * load(W, y + k), d + x * load(W, y + 6 + k)
+        store(W, z + i, c)
+        store(W, z + 6 + i, d)
     for i in range(6):
-        s = load(W, offset.L + 6 * i + i) * load(W, z + i)
+        x = load(W, offset.L + 6 * i + i)
+        c, d = x * load(W, z + i), x * load(W, z + 6 + i)
         for k in range(i + 1, 6):
-            s = s + load(W, offset.L + 6 * k + i) * load(W, z + k)
-        store(W, y + i, s)
-        store(W, gradient + i, load(W, gradient + i) - s)
+            x = load(W, offset.L + 6 * k + i)
+            c, d = c + x * load(W, z + k), d + x * load(W, z + 6 + k)
+        store(W, y + i, c)
+        store(W, y + 6 + i, d)
+        store(W, gradient + i, load(W, gradient + i) - c)
+        store(W, other + i, load(W, other + i) - d)
     for t in range(ns):
-        s = load(W, felt + t)
+        c, d, column = load(W, g + t), load(W, h + t), 5 + feet.support[t]
         for i in range(6):
-            s = s - load(W, y + i) * load(W, offset.C + ns * i + t)
-        store(W, gradient + 5 + feet.support[t], s)
+            x = load(W, offset.C + ns * i + t)
+            c, d = c - load(W, y + i) * x, d - load(W, y + 6 + i) * x
+        store(W, gradient + column, c)
+        store(W, other + column, d)
 
 
 @compiled
 def level_gradients(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
     """Projected gradients of h . t for the two level directions t: of the CoM, times the mass."""
-    n = len(tree.parent) - 1
+    n, ns = len(tree.parent) - 1, len(feet.support)
     for j in range(2):
         t = (splat(tree.level[j, 0]), splat(tree.level[j, 1]), splat(tree.level[j, 2]))
         at = offset.level + (n + 6) * j
         store_base_and_joints(tree, offset, W, at, t)
-        for k in range(len(feet.support)):
-            store(W, offset.felt + k, load(W, at + 5 + feet.support[k]))
-        project(feet, offset, W, at, offset.felt)
+        for k in range(ns):
+            store(W, offset.felt + ns * j + k, load(W, at + 5 + feet.support[k]))
+    project(feet, offset, W, offset.level)
 
 
 @compiled
