@@ -55,6 +55,11 @@ def compiled(function: _Function) -> _Function:
     return _jit(function, no_cpython_wrapper=True)
 
 
+def inlined(function: _Function) -> _Function:
+    """The same, repeated where it is called: handing it the robot costs more than what it does."""
+    return _jit(function, no_cpython_wrapper=True, forceinline=True)
+
+
 def entry(function: _Function) -> _Function:
     """A kernel that Python calls; see `bound`."""
     return _jit(function)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import load, magnitude, root, splat, store, where_less
 from copsense.batch.layout import CONTINUOUS, PRISMATIC, Feet, Tree
 from copsense.batch.vectors import (
@@ -35,7 +35,7 @@ _TILT = 0.5e-6  # rad
 _UNIT = 1e-6  # by which the square of a quaternion's length may miss one
 
 
-@compiled
+@inlined
 def move(tree: Tree, offset: Offsets, W: Any) -> None:
     """Rotations and positions of the bodies, their first moments, screws and gravity."""
     uneven = _place_base(tree, offset, W)

@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import get, primitive, put, row_pointer
 from copsense.batch.workspace import WIDTH
 
@@ -45,7 +45,7 @@ def read_postures(W: Any, row: int, values: Any, first: int, count: int) -> None
         _read_square(W, row + i, values, starts)
 
 
-@compiled
+@inlined
 def write_postures(W: Any, row: int, values: Any, first: int, count: int, column: int) -> None:
     """n rows of a workspace into values[first : first + count, column] (N, nk, n)."""
     n, stride = values.shape[2], values.shape[1] * values.shape[2]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import load, magnitude, root, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.statics.inertia import ancestor
@@ -137,7 +137,7 @@ def along_motions(offset: Offsets, W: Any, gradient: int, out: int, nv: int) -> 
         store(W, out + e, s)
 
 
-@compiled
+@inlined
 def margins(feet: Feet, offset: Offsets, W: Any, travel: bool) -> None:
     """Distance to each sole's nearest edge; with `travel`, how far the CoM may move.
 

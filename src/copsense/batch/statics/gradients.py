@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.kinematics import screw_cross
 from copsense.batch.lanes import load, splat, store
 from copsense.batch.layout import PRISMATIC, Feet, Tree
@@ -42,7 +42,7 @@ from copsense.batch.workspace import Offsets
 LOAD = 2  # output of a contact after its CoP's x and y: its share of the weight, for gains
 
 
-@compiled
+@inlined
 def wrench_gradients(
     tree: Tree, feet: Feet, offset: Offsets, W: Any, arm: float, gains: bool
 ) -> None:
@@ -88,7 +88,7 @@ def _stand_still(offset: Offsets, W: Any, k: int, nv: int) -> None:
         store(W, offset.gradient + 2 * nv * k + i, splat(0.0))
 
 
-@compiled
+@inlined
 def torque_gradients(
     tree: Tree,
     feet: Feet,

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import load, magnitude, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.statics.criteria import LEAST_TORQUE, KernelCriteria
@@ -44,7 +44,7 @@ def set_load(tree: Tree, offset: Offsets, W: Any) -> None:
         store(W, offset.nothing + j, splat(0.0))
 
 
-@compiled
+@inlined
 def least_wrench(feet: Feet, offset: Offsets, W: Any, arm: float) -> None:
     """Wrenches of least norm, `arm` = L^2; keeps c and the inverse of the 3 x 3 matrix."""
     nc = len(feet.body)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import any_less, load, root, splat, store, where_less
 from copsense.batch.layout import Feet
 from copsense.batch.vectors import Vector, add3, cross3, dot3, load3, scale3, store3, sub3
@@ -48,7 +48,7 @@ def second_moment(a: Vector) -> Any:
     return y + z, x + z, x + y, -(a[0] * a[1]), -(a[0] * a[2]), -(a[1] * a[2])
 
 
-@compiled
+@inlined
 def build(feet: Feet, offset: Offsets, W: Any) -> None:
     """D and B, then B = Q R in place."""
     if feet.held == 1:

@@ -11,14 +11,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import load, root, splat, store
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.vectors import cross3, dot3, load3, store3
 from copsense.batch.workspace import Offsets
 
 
-@compiled
+@inlined
 def span(feet: Feet, offset: Offsets, W: Any) -> None:
     """C, and the inverse L^-1 of the Cholesky factor of 1 + C' C."""
     ns = len(feet.support)
@@ -117,7 +117,7 @@ def project(feet: Feet, offset: Offsets, W: Any, gradient: int) -> None:
         store(W, other + column, d)
 
 
-@compiled
+@inlined
 def level_gradients(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
     """Projected gradients of h . t for the two level directions t: of the CoM, times the mass."""
     n, ns = len(tree.parent) - 1, len(feet.support)
