@@ -144,7 +144,7 @@ def _carry(tree: Tree, offset: Offsets, W: Any) -> None:
         store(W, offset.gravity + i, -dot3(rate, g))
 
 
-@compiled
+@inlined
 def place_feet(feet: Feet, offset: Offsets, W: Any) -> None:
     """Origins and axes of the contact frames; flag a contact that is off its stated plane."""
     base = load3(W, offset.base)

@@ -169,7 +169,7 @@ def _covector(feet: Feet, offset: Offsets, W: Any, k: int, output: int) -> Any:
     return add3(force, cross3(load3(W, offset.foot + 3 * k), moment)), moment
 
 
-@compiled
+@inlined
 def _adjoint(
     feet: Feet,
     offset: Offsets,
@@ -291,7 +291,7 @@ def _leave(limits: LimitOffsets, offset: Offsets, W: Any, r: int) -> None:
         store(W, offset.unknown + i, s)
 
 
-@compiled
+@inlined
 def _sweep(tree: Tree, feet: Feet, offset: Offsets, W: Any, at: int, felt: int) -> None:
     """One output's gradient (nv,) at row `at`, base in world axes, not yet projected.
 

@@ -84,7 +84,7 @@ def across_symmetric(W: Any, row: int, a: Any) -> Any:
     )
 
 
-@compiled
+@inlined
 def least_squares(
     feet: Feet, offset: Offsets, W: Any, criteria: KernelCriteria, index: int
 ) -> None:
