@@ -20,7 +20,7 @@ from copsense.simulation import Scenario
 
 pytest.importorskip("viser", reason="the extra explore is not installed")
 
-OWN = copsense.Criterion("own", (copsense.TorqueTerm(1.0),))
+OWN = copsense.Criterion("own-torque", (copsense.TorqueTerm(1.0),))
 
 
 def words(page):
@@ -57,8 +57,8 @@ def test_an_analysis_shows_its_own_criteria_and_posture(icub):
     limits = copsense.Limits(friction=0.5)
     analysis = copsense.analyse(icub, [OWN], limits, com_y=0.02)
     said = words(analysis.show())
-    assert said.count("own") == 2 + len(icub.contacts)  # the verdict, the scale, the table
-    margin = analysis.to_dict()["criteria"]["own"]["contacts"]["r_sole"]["margin"]
+    assert said.count("own-torque") == 2 + len(icub.contacts)  # the verdict, the scale, the table
+    margin = analysis.to_dict()["criteria"]["own-torque"]["contacts"]["r_sole"]["margin"]
     assert f"{1e3 * margin:.1f} to +y" in said
     assert "<code>" not in said  # no command makes this posture
 
