@@ -269,9 +269,9 @@ def test_a_sweep_holds_what_has_one_value():
         assert here.com[0] == pytest.approx(0.01, abs=1e-11)
         assert here.robot.joint_position(here.q, "l_elbow") == pytest.approx(np.radians(30))
         assert here.com_jacobian @ tangent == pytest.approx([0, 1, tangent @ here.com_jacobian[2]])
-    assert "say what to sweep" in copsense("sweep", "icub", "--com-y", "0.01").error
+    assert "--com-y with a single value holds" in copsense("sweep", "icub", "--com-y", "0.01").error
     two = ("--com-y", "0:1:2", "--com-x", "0:1:2")
-    assert "say what to sweep" in copsense("sweep", "icub", *two).error
+    assert "a sweep is along one" in copsense("sweep", "icub", *two).error
     rows = ("--configurations", "rows.csv", "--com-y", "0.1")
     assert "and so does --com-y" in copsense("sweep", "icub", *rows).error
     assert (
