@@ -33,10 +33,8 @@ def verdict(data: dict[str, Any]) -> str:
         and any("margin" not in row["contacts"][c["name"]] for row in data["criteria"].values())
     ]
     if blind:
-        return (
-            f"No sole is known under {', '.join(blind)}, so when it tips is not either: give "
-            "--sole X0:X1:Y0:Y1."
-        )
+        said = unknown_soles(", ".join(blind))
+        return said[:1].upper() + said[1:]
     best, *equal = ranked(reach)[0]
     distance, event = reach[best]
     if distance < 0:
@@ -51,6 +49,14 @@ def verdict(data: dict[str, Any]) -> str:
     return (
         f"{best} keeps the feet planted longest: to first order the CoM may move "
         f"{distance * 1e3:.1f} mm before {event}{_others(reach, best)}."
+    )
+
+
+def unknown_soles(contacts: str) -> str:
+    """A note on contacts of which no sole is known, named with commas."""
+    return (
+        f"no sole is known under {contacts}, so when it tips is not either: give "
+        "--sole X0:X1:Y0:Y1."
     )
 
 

@@ -17,7 +17,6 @@ from copsense.cli.printing import (
     echo_json,
     echo_notes,
     progress_bar,
-    unknown_soles,
     waiting,
 )
 from copsense.cli.stance_options import read_stance, stance_options
@@ -129,6 +128,7 @@ def map_command(
     """
     require("zarr", "a map's store")  # its extra brings what else a map needs
 
+    from copsense.analysis.verdicts import unknown_soles
     from copsense.batch import BatchKernel, PostureChart
     from copsense.files import check_output
     from copsense.maps import MapPlan

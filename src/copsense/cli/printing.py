@@ -79,14 +79,6 @@ def echo_notes(notes: Iterable[str]) -> None:
         said.add(note)
 
 
-def unknown_soles(contacts: str) -> str:
-    """A note on contacts of which no sole is known, named with commas."""
-    return (
-        f"no sole is known under {contacts}, so when it tips is not either: give "
-        "--sole X0:X1:Y0:Y1."
-    )
-
-
 def echo_written(*paths: str | Path | None) -> None:
     """Say of each file that it was written; None is passed over."""
     for path in paths:

@@ -18,7 +18,6 @@ from copsense.cli.printing import (
     echo_notes,
     echo_written,
     progress_bar,
-    unknown_soles,
 )
 from copsense.cli.stance_options import read_stance, swept_stance_options
 from copsense.cli.units import TIME
@@ -206,4 +205,6 @@ def _print(summary: dict[str, Any]) -> None:
                 f"{known[least]:.3f} Hz (least: {least})"
             )
     if summary["without_sole"]:
+        from copsense.analysis.verdicts import unknown_soles
+
         echo_notes([unknown_soles(summary["without_sole"])])
