@@ -159,6 +159,24 @@ class CopSensitivity:
             return None
         return equilibrium.next_active_set_change(t / speed)
 
+    def nearest_active_set_change(self) -> ActiveSetChange | None:
+        """The limit that begins or ceases to press first, whichever way the CoM moves.
+
+        Along the motions `com_motions`, in the horizontal direction that comes to a change first,
+        to first order: within its `travel` [m] the gains hold. What is only touched here is met at
+        once, travel 0.
+
+        Returns:
+            That change; None where nothing changes, as without limits.
+
+        Raises:
+            InvalidInputError: the tie-break alone presses on a limit, and when it lets go is not
+                followed.
+        """
+        if not isinstance(self.equilibrium, ConstrainedEquilibrium):
+            return None
+        return self.equilibrium.nearest_active_set_change(self.com_motions)
+
     def along_joint(self, tangent: ArrayLike, joint: str) -> Float[np.ndarray, "nc 2"]:
         """d cop / d joint along a path with this tangent [m/rad, or m/m of a prismatic joint]."""
         index = self.equilibrium.stance.robot.velocity_index(joint)

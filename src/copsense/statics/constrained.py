@@ -50,6 +50,7 @@ _APART = 1e-9  # share that the pressing rows leave of a row that does not depen
 _ROUNDING = 1e-13  # slack, relative to the weight, that is none however little they leave
 _RATES_TOLERANCE = 1e-6  # violation of an optimality condition of a one-sided derivative
 _CLOSING = 1e-9  # share of what is left of a limit, per unit of motion, that does not count
+_STILL = 1e-9  # rates, in shares of the weight or gradient per unit of motion, of none
 _SINGULAR = 1e-11  # eigenvalues of the cost, relative, that leave forces undetermined
 
 
@@ -244,6 +245,39 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         i = int(np.argmin(travel))
         name, kind, binds = self.names[i], self.kinds[i], not strong[i]
         return ActiveSetChange(self._criterion.name, name, kind, binds, float(travel[i]))
+
+    def nearest_active_set_change(
+        self, motions: Float[np.ndarray, "nv p"]
+    ) -> ActiveSetChange | None:
+        """The change of the pressing limits that the least motion meets, to first order.
+
+        Of all motions ``motions @ c`` with c of length 1, the one that comes to a change first: a
+        limit off its bound is its slack away over the length of the slack's rates, a pressing one
+        its multiplier over the length of the multiplier's. What is only touched here is met at
+        once. None if nothing moves.
+
+        Args:
+            motions: velocities V with J V = 0, as columns.
+
+        Raises:
+            InvalidInputError: the tie-break alone presses on a limit.
+        """
+        i, travel = self.nearest_changing_row(motions)
+        if i < 0:
+            return None
+        binds = not self._problem.strong[i]
+        return ActiveSetChange(self._criterion.name, self.names[i], self.kinds[i], binds, travel)
+
+    def nearest_changing_row(self, motions: Float[np.ndarray, "nv p"]) -> tuple[int, float]:
+        """The row that changes there, an index into `names`, and the travel; -1 and inf for none.
+
+        Args:
+            motions: as of `nearest_active_set_change`, which says the same in words.
+
+        Raises:
+            InvalidInputError: the tie-break alone presses on a limit.
+        """
+        return self._problem.nearest_change(self, motions)
 
     @property
     def _criterion(self) -> Criterion:
@@ -559,6 +593,24 @@ class _Problem:
         slack[strong] = 0.0
         slack[multipliers != 0] = 0.0
         return Rates(df, joints - self.load.joint_map @ df, multipliers, slack)
+
+    def nearest_change(self, at: ConstrainedEquilibrium, motions: np.ndarray) -> tuple[int, float]:
+        """The row that changes sides first along what these motions span, and its travel."""
+        self.check_followed(np.flatnonzero(self.tied), at.row_multipliers)
+        strong, along = np.flatnonzero(self.strong), StanceChange(motions)
+        df, _, dl = self.differentiate(at, along, strong)
+        rates = self.rates_of_data(at, along)[3] - self.A.dot(df)
+        rates[strong] = dl
+        left, unit = np.maximum(at.slack, 0.0), self.weight * self.scale
+        left[strong] = at.row_multipliers[strong]
+        unit[strong] = self.program.gradient_size(at.forces) / self.scale[strong]
+        speed = np.linalg.norm(rates, axis=1)
+        moves = (speed > _STILL * unit) & ~self.tied
+        if not np.any(moves):
+            return -1, np.inf
+        travel = np.where(moves, left / np.where(moves, speed, 1.0), np.inf)
+        i = int(np.argmin(travel))
+        return i, float(travel[i])
 
     def _tied_rates(
         self, at: ConstrainedEquilibrium, v: np.ndarray, strong: np.ndarray, weak: np.ndarray

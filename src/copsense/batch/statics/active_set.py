@@ -63,6 +63,10 @@ class Programs(NamedTuple):
         rate: of the held rows' multipliers (m,).
         u: multipliers of the held rows (m,).
         held: the held rows (m,).
+        wrench_rate: of the wrenches along both CoM motions (2, 6 nc).
+        torque_rate: of the support joints' torques (2, ns).
+        u_rate: of the held rows' multipliers (2, m).
+        travel: of the CoM until each row changes sides, squared (rows,).
     """
 
     N: np.ndarray
@@ -87,6 +91,10 @@ class Programs(NamedTuple):
     rate: np.ndarray
     u: np.ndarray
     held: np.ndarray
+    wrench_rate: np.ndarray
+    torque_rate: np.ndarray
+    u_rate: np.ndarray
+    travel: np.ndarray
 
 
 def programs(limits: KernelLimits, contacts: int, supports: int, unknowns: int) -> Programs:
@@ -105,10 +113,13 @@ def programs(limits: KernelLimits, contacts: int, supports: int, unknowns: int) 
         "strain": supports,
         "Q": (m, m),
         "R": (m, m),
+        "wrench_rate": (2, 6 * contacts),
+        "torque_rate": (2, supports),
+        "u_rate": (2, m),
     }
     sizes |= dict.fromkeys(("x", "centre", "a", "d", "rate", "u"), m)
     arrays = {name: np.zeros(size) for name, size in sizes.items()}
-    arrays |= {name: np.full(rows, np.inf) for name in ("slack", "start")}
+    arrays |= {name: np.full(rows, np.inf) for name in ("slack", "start", "travel")}
     return Programs(
         **arrays,
         inverse=np.append(limits.inverse, np.ones(rows - len(limits.bound))),

@@ -113,7 +113,7 @@ class BatchKernel(HoldsMachineCode):
                     f"limits apply to a Criterion; the policy {policies[0]!r} has to respect them "
                     "itself. Leave limits or the policy out."
                 )
-            self._template = limit_template(stance, self.limits, len(chosen))
+            self._template = limit_template(stance, self.limits, self.names)
         self._single: _Single | None = None
         self._nq = int(stance.robot.model.nq)
         self._nothing = self.empty(0)
@@ -162,7 +162,7 @@ class BatchKernel(HoldsMachineCode):
         result = empty_result(self.stance, self.names, size, gains=self.gains)
         if self._template is None:
             return result
-        return replace(result, limits=empty_limits(self._template, size))
+        return replace(result, limits=empty_limits(self._template, size, gains=self.gains))
 
     def evaluate(
         self,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from copsense.batch.statics.limit_result import LimitResult, limit_arrays
+from copsense.batch.statics.limit_result import CHANGES, LimitResult, limit_arrays
 from copsense.batch.statics.limit_states import IMPOSSIBLE, UNLOADED
 from copsense.content import FrozenMapping, freeze
 from copsense.errors import InvalidInputError
@@ -161,7 +161,8 @@ def check_out(out: object, expected: BatchResult, count: int, *, gains: bool) ->
     if out.limits is not None and expected.limits is not None:
         for name, array in limit_arrays(out.limits).items():
             wanted = getattr(expected.limits, name)
-            fits = array.shape == (count, *wanted.shape[1:]) and array.dtype == wanted.dtype
+            shape = (count if gains or name not in CHANGES else 0, *wanted.shape[1:])
+            fits = array.shape == shape and array.dtype == wanted.dtype
             if not (fits and array.flags.carray and out.limits.limits == expected.limits.limits):
                 raise InvalidInputError(
                     f"out.limits.{name} does not fit the limits of the batch. {remedy}"

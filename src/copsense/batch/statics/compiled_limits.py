@@ -57,6 +57,9 @@ class CompiledLimits(HoldsMachineCode):
             np.zeros(WIDTH, dtype=np.int64),
             np.zeros((WIDTH, m), dtype=np.int64),
             np.zeros((WIDTH, m)),
+            np.zeros((WIDTH, m, m)),
+            np.zeros((WIDTH, m, m)),
+            np.zeros(WIDTH),
         )
         memory = programs(self._limits, len(feet.body), len(feet.support), feet.unknowns)
         return workspace(self._offset.size), memory, pack

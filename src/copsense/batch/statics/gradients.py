@@ -105,7 +105,7 @@ def torque_gradients(
     """
     nv, ns = len(tree.parent) + 5, len(feet.support)
     _lever_arms(tree, feet, offset, W)
-    _multipliers(feet, offset, W, criteria, index, limits)
+    joint_multipliers(feet, offset, W, criteria, index, limits)
     for k in range(len(feet.body)):
         if feet.point[k]:
             _stand_still(offset, W, k, nv)
@@ -134,7 +134,7 @@ def _lever_arms(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
 
 
 @compiled
-def _multipliers(
+def joint_multipliers(
     feet: Feet,
     offset: Offsets,
     W: Any,

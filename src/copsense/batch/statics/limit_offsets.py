@@ -21,6 +21,13 @@ class LimitOffsets(NamedTuple):
         pressing: multiplier of each support joint's torque, signed as the torque (ns,).
         shift: x, or a gradient along it (r,).
         scale: norm of each support joint's torque over the contacts' wrenches (ns,).
+        twist: of each body along a motion (n + 1, 6).
+        moved: what a motion adds to dh of each body by the joints it carries (n + 1, 3).
+        gravity_rate: change of G along both motions (2, n + 1).
+        screw_rate: change of the support joints' screws (2, ns, 6).
+        load_rate: change of b (2, 6).
+        wrench_rate: change of the contact wrenches if no row were held (2, 6 nc).
+        torque_rate: change of the torques, likewise (2, n + 1).
         size: rows in all.
     """
 
@@ -33,12 +40,20 @@ class LimitOffsets(NamedTuple):
     pressing: int
     shift: int
     scale: int
+    twist: int
+    moved: int
+    gravity_rate: int
+    screw_rate: int
+    load_rate: int
+    wrench_rate: int
+    torque_rate: int
     size: int
 
 
 def limit_offsets(layout: RobotLayout, offset: Offsets) -> LimitOffsets:
     """Lay the blocks out behind the others."""
     nc, ns, r = len(layout.feet.body), len(layout.feet.support), layout.feet.unknowns
+    bodies = len(layout.tree.parent)
     sizes = {
         "lost": 1,
         "N": 6 * nc * r,
@@ -49,6 +64,13 @@ def limit_offsets(layout: RobotLayout, offset: Offsets) -> LimitOffsets:
         "pressing": ns,
         "shift": r,
         "scale": ns,
+        "twist": 6 * bodies,
+        "moved": 3 * bodies,
+        "gravity_rate": 2 * bodies,
+        "screw_rate": 12 * ns,
+        "load_rate": 12,
+        "wrench_rate": 12 * nc,
+        "torque_rate": 2 * bodies,
     }
     starts, end = {}, offset.size
     for name, size in sizes.items():

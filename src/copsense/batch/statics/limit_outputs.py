@@ -32,6 +32,8 @@ class LimitOut(NamedTuple):
         relaxation: least amount by which every row would have to be relaxed (N,).
         conflict: rows that demand it (N, r + 1); -1 where there are fewer.
         unloaded: a bit for each contact without load (N, nk).
+        change_travel: of the CoM to the nearest change of the pressing rows (G, nk).
+        change_limit: the row that begins or ceases to press there (G, nk); -1 for none.
     """
 
     state: np.ndarray
@@ -44,6 +46,8 @@ class LimitOut(NamedTuple):
     relaxation: np.ndarray
     conflict: np.ndarray
     unloaded: np.ndarray
+    change_travel: np.ndarray
+    change_limit: np.ndarray
 
 
 @compiled
@@ -59,6 +63,9 @@ def begin_row(
     found.unloaded[row, column] = 0
     found.optimality[row, column] = 0.0
     found.relaxation[row] = 0.0
+    if len(found.change_travel):
+        found.change_travel[row, column] = np.nan
+        found.change_limit[row, column] = -1
     for k in range(found.conflict.shape[1]):
         found.conflict[row, k] = -1
     nearest = row_margins(feet, rows, out, found.own_margins, slack, row, column)

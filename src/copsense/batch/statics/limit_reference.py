@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
 from copsense.batch.statics.limit_result import LimitResult
@@ -33,6 +35,8 @@ def solve_limited(
     result.pressing[row, column] = -1
     result.multipliers[row, column] = 0.0
     result.touching[row, column] = result.unloaded[row, column] = 0
+    if len(result.change_travel):
+        result.change_travel[row, column], result.change_limit[row, column] = np.nan, -1
     result.optimality[row, column] = np.nan
     result.margins[row, column] = result.own_margins[row, column] = np.nan
     result.own_margins[row, column] = _margins(table, _or_none(stance, criterion))
@@ -54,11 +58,20 @@ def solve_limited(
     result.optimality[row, column] = found.optimality() if len(pressing) else 0.0
     result.margins[row, column] = _margins(table, found)
     result.state[row, column] = PRESSED if len(pressing) else WITHIN
+    if len(result.change_travel):
+        _look_ahead(found, result, row, column)
     if found.unloaded:
         names = stance.contact_names
         result.state[row, column] = UNLOADED
         result.unloaded[row, column] = sum(1 << names.index(name) for name in found.unloaded)
     return found
+
+
+def _look_ahead(found: ConstrainedEquilibrium, result: LimitResult, row: int, column: int) -> None:
+    """The nearest change of the pressing limits; NaN where it cannot be followed."""
+    with suppress(CopsenseError):
+        limit, travel = found.nearest_changing_row(found.stance.com_motions)
+        result.change_limit[row, column], result.change_travel[row, column] = limit, travel
 
 
 def _or_none(stance: Stance, criterion: Criterion) -> StaticEquilibrium | None:

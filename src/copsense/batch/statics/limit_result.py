@@ -15,7 +15,7 @@ from copsense.listing import counted
 from copsense.load_problem import LoadProblem
 from copsense.margins import MarginTable
 from copsense.stance import Stance
-from copsense.statics import ActiveLimit
+from copsense.statics import ActiveLimit, ActiveSetChange
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,7 @@ class LimitResult:
 
     Attributes:
         limits: what was asked of wrenches and torques.
+        criteria: names of the criteria.
         names: what each row of the limits is (r,), such as ``"torque of l_knee"``.
         kinds: of the rows (r,), as of `ActiveLimit`.
         margin_names: contact or joint, and kind, of each margin (g,).
@@ -42,9 +43,14 @@ class LimitResult:
             respects them [N, Nm]; 0 elsewhere.
         conflict: index of the rows that demand it, -1 where there are fewer.
         unloaded: a bit for each contact without load where one has none.
+        change_travel: how far the CoM may travel to first order, whichever way, before a limit
+            begins or ceases to press [m]; infinite where none will, NaN where there is no answer;
+            empty where gains were not asked for.
+        change_limit: index of the row that does; -1 for none. See `nearest_change`.
     """
 
     limits: Limits
+    criteria: tuple[str, ...]
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     margin_names: tuple[tuple[str, str], ...]
@@ -58,6 +64,8 @@ class LimitResult:
     relaxation: Float[np.ndarray, " N"]
     conflict: Int[np.ndarray, "N c"]
     unloaded: UInt8[np.ndarray, "N nk"]
+    change_travel: Float[np.ndarray, "G nk"]
+    change_limit: Int[np.ndarray, "G nk"]
 
     def __repr__(self) -> str:
         """How many answers are in each state."""
@@ -80,6 +88,19 @@ class LimitResult:
         ]
         return tuple(sorted(found, key=lambda limit: -limit.multiplier))
 
+    def nearest_change(self, posture: int, criterion: int) -> ActiveSetChange | None:
+        """The change of the pressing limits that the CoM meets first, whichever way it goes.
+
+        As `CopSensitivity.nearest_active_set_change`. None where there is no change, and where
+        there is no answer or gains were not asked for.
+        """
+        if not len(self.change_limit) or self.change_limit[posture, criterion] < 0:
+            return None
+        i, travel = self.change_limit[posture, criterion], self.change_travel[posture, criterion]
+        name = self.criteria[criterion]
+        binds = i not in self.pressing[posture, criterion]
+        return ActiveSetChange(name, self.names[i], self.kinds[i], binds, float(travel))
+
     def reason(self, posture: int, criterion: int, contacts: tuple[str, ...]) -> str:
         """Why a posture has no answer under a criterion; empty where another reason may hold."""
         state = self.state[posture, criterion]
@@ -96,22 +117,24 @@ class LimitResult:
 
 def limit_arrays(result: LimitResult) -> dict[str, np.ndarray]:
     """Its arrays by name."""
-    named = ("limits", "names", "kinds", "margin_names")
+    named = ("limits", "criteria", "names", "kinds", "margin_names")
     return {f.name: getattr(result, f.name) for f in fields(result) if f.name not in named}
 
 
-_EMPTY = {"state": UNANSWERED, "pressing": -1, "conflict": -1}
-_NUMBERS = ("optimality", "margins", "own_margins")
+_EMPTY = {"state": UNANSWERED, "pressing": -1, "conflict": -1, "change_limit": -1}
+_NUMBERS = ("optimality", "margins", "own_margins", "change_travel")
+CHANGES = ("change_travel", "change_limit")
+"""Arrays that a batch fills only where it is asked for gains."""
 
 
-def limit_template(stance: Stance, limits: Limits, criteria: int) -> LimitResult:
+def limit_template(stance: Stance, limits: Limits, criteria: tuple[str, ...]) -> LimitResult:
     """A result of no posture."""
     rows = limit_rows(stance, limits)
     table = MarginTable(stance.contacts, rows)
     load = LoadProblem.of(stance)
     # As many rows can press as the balance leaves forces.
     free = max(load.base_map.shape[1] - int(np.linalg.matrix_rank(load.base_map)), 1)
-    each, groups = (0, criteria), len(table.groups)
+    each, groups = (0, len(criteria)), len(table.groups)
     arrays: dict[str, Any] = {
         "state": np.zeros(each, dtype=np.uint8),
         "pressing": np.zeros((*each, free), dtype=np.int64),
@@ -123,10 +146,13 @@ def limit_template(stance: Stance, limits: Limits, criteria: int) -> LimitResult
         "relaxation": np.zeros(0),
         "conflict": np.zeros((0, free + 1), dtype=np.int64),
         "unloaded": np.zeros(each, dtype=np.uint8),
+        "change_travel": np.zeros(each),
+        "change_limit": np.zeros(each, dtype=np.int64),
     }
     first = [int(members[0]) for members in table.groups]
     return LimitResult(
         limits,
+        criteria,
         rows.all_names,
         rows.all_kinds,
         tuple((table.where[i], table.kinds[i]) for i in first),
@@ -134,10 +160,11 @@ def limit_template(stance: Stance, limits: Limits, criteria: int) -> LimitResult
     )
 
 
-def empty_limits(template: LimitResult, count: int) -> LimitResult:
+def empty_limits(template: LimitResult, count: int, *, gains: bool) -> LimitResult:
     """A result of so many postures, to be filled."""
     arrays: dict[str, Any] = {}
     for name, array in limit_arrays(template).items():
         nothing = np.nan if name in _NUMBERS else _EMPTY.get(name, 0)
-        arrays[name] = np.full((count, *array.shape[1:]), nothing, dtype=array.dtype)
+        rows = count if gains or name not in CHANGES else 0
+        arrays[name] = np.full((rows, *array.shape[1:]), nothing, dtype=array.dtype)
     return replace(template, **arrays)

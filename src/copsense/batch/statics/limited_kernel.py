@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from copsense.batch.compiler import compiled, entry, from_array
+from copsense.batch.compiler import compiled, entry, from_array, inlined
 from copsense.batch.kinematics import move, place_feet
 from copsense.batch.lanes import get, load, store
 from copsense.batch.layout import Feet, Tree
@@ -31,6 +31,7 @@ from copsense.batch.statics.gradients import torque_gradients
 from copsense.batch.statics.inertia import factorise_inertia
 from copsense.batch.statics.kernel import Out
 from copsense.batch.statics.kernel_limits import KernelLimits
+from copsense.batch.statics.limit_changes import move_joints, nearest_change, write_rates
 from copsense.batch.statics.limit_offsets import LimitOffsets
 from copsense.batch.statics.limit_outputs import LimitOut, begin_row, row_margins, write_lane
 from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNLOADED
@@ -74,6 +75,9 @@ class Pack(NamedTuple):
             reference must (`WIDTH`,).
         held: these rows (`WIDTH`, m).
         u: their multipliers (`WIDTH`, m).
+        Q: orthonormal, its first columns span them (`WIDTH`, m, m).
+        R: their triangular factor (`WIDTH`, m, m).
+        size: largest entry of the cost's gradient (`WIDTH`,).
     """
 
     queue: np.ndarray
@@ -82,6 +86,9 @@ class Pack(NamedTuple):
     pressed: np.ndarray
     held: np.ndarray
     u: np.ndarray
+    Q: np.ndarray
+    R: np.ndarray
+    size: np.ndarray
 
 
 @entry
@@ -108,10 +115,10 @@ def limit_postures(
     """
     offset, limits = _offsets(offsets), _limit_offsets(limit_offsets)
     at = Within(feet, offset, limits, rows, criteria, W, p)
-    doubt, waiting = False, 0
-    moving, gains = feet.held == 1, len(out.com_gain) > 0
+    doubt, waiting, calm = False, 0, stop - start
+    moving, gains, nv = feet.held == 1, len(out.com_gain) > 0, len(tree.parent) + 5
     for row in range(start, stop):
-        near = False
+        near, known = False, False
         for index in range(len(criteria.kind)):
             column = criteria.column[index]
             doubtful = out.doubtful[row, column] != 0
@@ -119,10 +126,17 @@ def limit_postures(
             if not doubtful and begin_row(feet, rows, out, found, p.slack, row, column):
                 pack.candidate[row - start, index] = 1
                 near = True
+            known = known or not doubtful
             doubt = doubt or doubtful
         if near:
             pack.queue[waiting] = row
             waiting += 1
+        elif known and gains:  # behind the others: no gradient is theirs
+            calm -= 1
+            pack.queue[calm] = row
+    for i in range(calm, stop - start):
+        pack.queue[waiting] = pack.queue[i]
+        waiting += 1
     for first in range(0, waiting, WIDTH):
         count = min(WIDTH, waiting - first)
         for lane in range(count):
@@ -139,6 +153,7 @@ def limit_postures(
         if gains:
             factorise_inertia(tree, offset, W)
             com_motions(tree, feet, offset, W)
+            move_joints(tree, feet, offset, limits, W)
         for index in range(len(criteria.kind)):
             store(W, offset.doubt, load(W, offset.flag))
             least_squares(feet, offset, W, criteria, index)
@@ -158,29 +173,31 @@ def limit_postures(
                         out.doubtful[row, criteria.column[index]] = 1
                     doubt = doubt or pack.pressed[lane] < -1
                     doubt = doubt or found.state[row, criteria.column[index]] == IMPOSSIBLE
-            if not some:
-                continue
-            move_unknowns(feet, offset, limits, W, criteria, index)
-            store(W, offset.doubt, load(W, limits.lost))
-            finish(tree, feet, offset, W)
-            torque_gradients(tree, feet, offset, W, criteria, index, gains, limits)
-            nv = len(tree.parent) + 5
+            if some:
+                move_unknowns(feet, offset, limits, W, criteria, index)
+                store(W, offset.doubt, load(W, limits.lost))
+                finish(tree, feet, offset, W)
+                torque_gradients(tree, feet, offset, W, criteria, index, gains, limits)
+                if gains:
+                    com_gains(feet, offset, W, nv)
+                margins(feet, offset, W, gains)
+                for output in range(2 * len(feet.body)):
+                    base = offset.gradient + nv * output
+                    store3(W, base, along(W, offset.rotation, load3(W, base)))
+                    store3(W, base + 3, along(W, offset.rotation, load3(W, base + 3)))
             if gains:
-                com_gains(feet, offset, W, nv)
-            margins(feet, offset, W, gains)
-            for output in range(2 * len(feet.body)):
-                base = offset.gradient + nv * output
-                store3(W, base, along(W, offset.rotation, load3(W, base)))
-                store3(W, base + 3, along(W, offset.rotation, load3(W, base + 3)))
+                write_rates(tree, feet, offset, limits, W, criteria, index)
             for lane in range(count):
+                row, column = pack.queue[first + lane], criteria.column[index]
                 if pack.pressed[lane] > 0:
-                    row, column = pack.queue[first + lane], criteria.column[index]
                     good = _conclude(at, lane, row, index, pack, found)
                     write_lane(feet, offset, W, lane, row, column, out, nv, gains)
                     row_margins(feet, rows, out, found.margins, p.slack, row, column)
                     if not good:
                         out.doubtful[row, column] = 1
                     doubt = doubt or not good or found.state[row, column] == UNLOADED
+                if gains and out.doubtful[row, column] == 0:
+                    _look_ahead(at, lane, row, column, pack, found)
     return doubt
 
 
@@ -239,6 +256,10 @@ def _settle(at: Within, lane: int, row: int, index: int, pack: Pack, found: Limi
         return
     found.state[row, column] = PRESSED
     write_responses(at, lane, q)
+    pack.size[lane] = size
+    for i in range(r):
+        for j in range(r):
+            pack.Q[lane, i, j], pack.R[lane, i, j] = p.Q[i, j], p.R[i, j]
     for k in range(q):
         pack.held[lane, k], pack.u[lane, k] = p.held[k], p.u[k]
         found.pressing[row, column, k] = _public(feet, rows, p.held[k])
@@ -292,6 +313,26 @@ def _public(feet: Feet, rows: KernelLimits, row: int) -> int:
     if row < rc:
         return rows.public[row]
     return rows.row[feet.support[(row - rc) // 2]] + (row - rc) % 2
+
+
+@inlined
+def _look_ahead(at: Within, lane: int, row: int, column: int, pack: Pack, found: LimitOut) -> None:
+    """The nearest change of the pressing rows, where there are wrenches within the limits."""
+    feet, rows, p = at.feet, at.rows, at.p
+    if found.state[row, column] == IMPOSSIBLE:
+        return
+    held, u, Q, R = pack.held[lane], pack.u[lane], pack.Q[lane], pack.R[lane]
+    q = max(pack.pressed[lane], 0)
+    travel, which = nearest_change(at, lane, q, held, u, Q, R, pack.size[lane])
+    found.change_travel[row, column] = travel
+    found.change_limit[row, column] = -1
+    if which >= len(p.travel):
+        i = which - len(p.travel)
+        found.change_limit[row, column] = rows.row[i]
+        if get(at.W, at.offset.torque + i, lane) < 0.0:
+            found.change_limit[row, column] += 1
+    elif which >= 0:
+        found.change_limit[row, column] = _public(feet, rows, which)
 
 
 @compiled

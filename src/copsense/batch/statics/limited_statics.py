@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from copsense.batch.compiler import compiled
+from copsense.batch.compiler import compiled, inlined
 from copsense.batch.lanes import get, load, put, root, splat, store
 from copsense.batch.layout import Feet
 from copsense.batch.statics.active_set import Programs, measure, release, write_row
@@ -137,9 +137,15 @@ def move_unknowns(
 @compiled
 def read_program(at: Within, lane: int) -> None:
     """One posture's program, from its lane."""
-    feet, offset, limits, rows, _criteria, W, p = at
+    read_forces(at, lane)
+    read_maps(at, lane)
+
+
+@inlined
+def read_maps(at: Within, lane: int) -> None:
+    """Of one posture's program N, B and the centre."""
+    feet, _offset, limits, _rows, _criteria, W, p = at
     ns, r, nc = len(feet.support), feet.unknowns, len(feet.body)
-    rc = len(rows.bound)
     for j in range(r):
         for c in range(6 * nc):
             p.N[c, j] = get(W, limits.N + 6 * nc * j + c, lane)
@@ -148,9 +154,18 @@ def read_program(at: Within, lane: int) -> None:
         p.centre[j] = 0.0
     for c in range(6 * nc):
         p.N[c, r] = 0.0
-        p.wrench[c] = get(W, offset.contact_wrench + c, lane)
     for t in range(ns):
         p.B[t, r] = 0.0
+
+
+@inlined
+def read_forces(at: Within, lane: int) -> None:
+    """Of one posture's program wrenches and torques, and the torques' limits."""
+    feet, offset, limits, rows, _criteria, W, p = at
+    rc = len(rows.bound)
+    for c in range(6 * len(feet.body)):
+        p.wrench[c] = get(W, offset.contact_wrench + c, lane)
+    for t in range(len(feet.support)):
         p.torque[t] = get(W, offset.torque + feet.support[t], lane)
         p.limit[t] = rows.torque[feet.support[t]]
         scale = get(W, limits.scale + t, lane)
