@@ -1,8 +1,10 @@
 """Limited kernel: postures that a criterion's own wrenches take to a limit, solved within limits.
 
 It follows the kernel without limits and takes its results. Where no limit is near they stand;
-elsewhere postures are gathered, a few abreast, and solved within the limits. What a posture gets
-does not depend on the others.
+elsewhere postures are gathered, a few abreast, and solved within the limits, each from its own
+optimum without limits: a neighbour's active set would save it two or three changes of rows, and
+have it depend on who came before. Where gains are asked for, all postures go through their CoM
+motions once more, for the limits that come nearer along them.
 """
 
 from __future__ import annotations
