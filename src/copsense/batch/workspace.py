@@ -50,7 +50,7 @@ class Offsets(NamedTuple):
         unknown: y or its adjoint (r,).
         six: coefficients of two projections (2, 2, 6).
         felt: gradients on the support joints (2, ns), then memory for another (ns,).
-        along: two gradients' parts along Q (2, r), or a motion's along Y (r + 6,).
+        along: two gradients' parts along Q (2, r), or two motions' along Y (2, r + 6).
         load: b, what the contacts' wrenches sum up to (6,).
         nothing: zeros (6,).
         wrench: phi of each contact (nc, 6).
@@ -187,7 +187,7 @@ def workspace_offsets(layout: RobotLayout, nq: int) -> Offsets:
         "unknown": r,
         "six": 24,
         "felt": 3 * ns,
-        "along": max(r + 6, 2 * r),
+        "along": 2 * (r + 6),
         "load": 6,
         "nothing": 6,
         "wrench": 6 * nc,

@@ -28,67 +28,87 @@ _FIXED = 1e-12  # determinant, relative, of a CoM that cannot move both ways
 
 @compiled
 def com_motions(tree: Tree, feet: Feet, offset: Offsets, W: Any) -> None:
-    """The two motions (2, nv) of unit CoM velocity along x and y, the base in world axes."""
+    """The two motions (2, nv) of unit CoM velocity along x and y, the base in world axes.
+
+    Two of everything at a time: what one computes need not wait for the other.
+    """
     nv, ns, r = len(tree.parent) + 5, len(feet.support), feet.unknowns
     m = 6 + ns
-    for c in range(r + 6):
-        _constraint(feet, offset, W, offset.Y + m * c, c, nv)
+    for c in range(0, r + 6, 2):
+        _constraints(feet, offset, W, min(c, r + 4), nv)
     lost = factorise(W, offset.Y, offset.RY, m, r + 6)
     store(W, offset.flag, where_less(lost, 0.5, load(W, offset.flag), splat(1.0)))
-    for e in range(2):
-        at = offset.motion + nv * e
-        for i in range(nv):
-            store(W, at + i, load(W, offset.H + nv * i + e) if i >= e else splat(0.0))
+    one, two = offset.motion, offset.motion + nv
+    for i in range(nv):
+        store(W, one + i, load(W, offset.H + nv * i))
+        store(W, two + i, load(W, offset.H + nv * i + 1) if i >= 1 else splat(0.0))
+    for c in range(r + 6):
+        y = offset.Y + m * c
+        a, b = load(W, y) * load(W, one), load(W, y) * load(W, two)
+        for i in range(1, m):
+            where, q = i if i < 6 else 5 + feet.support[i - 6], load(W, y + i)
+            a, b = a + q * load(W, one + where), b + q * load(W, two + where)
+        store(W, offset.along + c, a)
+        store(W, offset.along + r + 6 + c, b)
+    for i in range(m):
+        where = i if i < 6 else 5 + feet.support[i - 6]
+        a, b = load(W, one + where), load(W, two + where)
         for c in range(r + 6):
-            y = offset.Y + m * c
-            s = load(W, y) * load(W, at)
-            for i in range(1, 6):
-                s = s + load(W, y + i) * load(W, at + i)
-            for t in range(ns):
-                s = s + load(W, y + 6 + t) * load(W, at + 5 + feet.support[t])
-            store(W, offset.along + c, s)
-        for i in range(m):
-            where = at + i if i < 6 else at + 5 + feet.support[i - 6]
-            s = load(W, where)
-            for c in range(r + 6):
-                s = s - load(W, offset.along + c) * load(W, offset.Y + m * c + i)
-            store(W, where, s)
-        for i in range(nv):
-            s = load(W, at + i)
-            j = ancestor(tree, i)
-            while j >= 0:
-                s = s - load(W, offset.H + nv * i + j) * load(W, at + j)
-                j = ancestor(tree, j)
-            store(W, at + i, s * load(W, offset.diagonal + i))
+            q = load(W, offset.Y + m * c + i)
+            a, b = a - load(W, offset.along + c) * q, b - load(W, offset.along + r + 6 + c) * q
+        store(W, one + where, a)
+        store(W, two + where, b)
+    for i in range(nv):
+        a, b = load(W, one + i), load(W, two + i)
+        j = ancestor(tree, i)
+        while j >= 0:
+            l = load(W, offset.H + nv * i + j)
+            a, b = a - l * load(W, one + j), b - l * load(W, two + j)
+            j = ancestor(tree, j)
+        store(W, one + i, a * load(W, offset.diagonal + i))
+        store(W, two + i, b * load(W, offset.diagonal + i))
     _normalise(tree, offset, W, nv)
 
 
 @compiled
-def _constraint(feet: Feet, offset: Offsets, W: Any, y: int, c: int, nv: int) -> None:
-    """y = L^-T of a row of the contact Jacobian, (0, Q) or (1, D), on base and support joints."""
+def _constraints(feet: Feet, offset: Offsets, W: Any, c: int, nv: int) -> None:
+    """y = L^-T of rows c and c + 1 of the contact Jacobian, on base and support joints.
+
+    Its rows are (0, Q) and (1, D).
+    """
     ns, r = len(feet.support), feet.unknowns
-    for i in range(6):
-        store(W, y + i, splat(1.0 if i == c - r else 0.0))
-    for t in range(ns):
-        z = load(W, offset.Q + ns * c + t) if c < r else load(W, offset.held_row + 6 * t + c - r)
-        store(W, y + 6 + t, z)
+    y, z = offset.Y + (6 + ns) * c, offset.Y + (6 + ns) * (c + 1)
+    for e, at in ((c, y), (c + 1, z)):
+        for i in range(6):
+            store(W, at + i, splat(1.0 if i == e - r else 0.0))
+        for t in range(ns):
+            on = offset.Q + ns * e + t if e < r else offset.held_row + 6 * t + e - r
+            store(W, at + 6 + t, load(W, on))
     for t in range(ns - 1, -1, -1):
         own = offset.H + nv * (5 + feet.support[t])
-        x = load(W, y + 6 + t) * load(W, offset.diagonal + 5 + feet.support[t])
-        store(W, y + 6 + t, x)
+        d = load(W, offset.diagonal + 5 + feet.support[t])
+        a, b = load(W, y + 6 + t) * d, load(W, z + 6 + t) * d
+        store(W, y + 6 + t, a)
+        store(W, z + 6 + t, b)
         up = feet.anchor[feet.support[t]]
         while up >= 0:
-            before = load(W, y + 6 + up)
-            store(W, y + 6 + up, before - load(W, own + 5 + feet.support[up]) * x)
+            l = load(W, own + 5 + feet.support[up])
+            store(W, y + 6 + up, load(W, y + 6 + up) - l * a)
+            store(W, z + 6 + up, load(W, z + 6 + up) - l * b)
             up = feet.anchor[feet.support[up]]
         for i in range(6):
-            store(W, y + i, load(W, y + i) - load(W, own + i) * x)
+            l = load(W, own + i)
+            store(W, y + i, load(W, y + i) - l * a)
+            store(W, z + i, load(W, z + i) - l * b)
     for i in range(5, -1, -1):
-        own = offset.H + nv * i
-        x = load(W, y + i) * load(W, offset.diagonal + i)
-        store(W, y + i, x)
+        own, d = offset.H + nv * i, load(W, offset.diagonal + i)
+        a, b = load(W, y + i) * d, load(W, z + i) * d
+        store(W, y + i, a)
+        store(W, z + i, b)
         for j in range(i):
-            store(W, y + j, load(W, y + j) - load(W, own + j) * x)
+            l = load(W, own + j)
+            store(W, y + j, load(W, y + j) - l * a)
+            store(W, z + j, load(W, z + j) - l * b)
 
 
 @compiled

@@ -179,9 +179,11 @@ def factorise(W: Any, A: int, R: int, m: int, r: int) -> Any:
         inverse = 1.0 / length
         for i in range(m):
             store(W, a + i, load(W, a + i) * inverse)
-        # Off the columns to come at once: these do not wait for one another.
-        for k in range(j + 1, r):
-            store(W, R + r * j + k, _take_off(W, A + m * k, a, m, splat(1.0)))
+        # Off the columns to come at once, two at a time: these do not wait for one another.
+        for k in range(j + 1, r - 1, 2):
+            _take_off_two(W, A + m * k, a, m, R + r * j + k)
+        if (r - j) % 2 == 0:
+            store(W, R + r * j + r - 1, _take_off(W, A + m * (r - 1), a, m, splat(1.0)))
     return lost
 
 
@@ -203,6 +205,23 @@ def _take_off(W: Any, a: int, q: int, m: int, share: Any) -> Any:
     for i in range(m):
         store(W, a + i, load(W, a + i) - c * load(W, q + i))
     return c
+
+
+@compiled
+def _take_off_two(W: Any, a: int, q: int, m: int, out: int) -> None:
+    """a -= c q with c = q . a, into `out`, for two columns one after the other."""
+    b = a + m
+    x = load(W, q)
+    c, d = x * load(W, a), x * load(W, b)
+    for i in range(1, m):
+        x = load(W, q + i)
+        c, d = c + x * load(W, a + i), d + x * load(W, b + i)
+    for i in range(m):
+        x = load(W, q + i)
+        store(W, a + i, load(W, a + i) - c * x)
+        store(W, b + i, load(W, b + i) - d * x)
+    store(W, out, c)
+    store(W, out + 1, d)
 
 
 @compiled
