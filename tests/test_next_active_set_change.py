@@ -146,6 +146,36 @@ def test_a_touched_limit_has_taken_its_side(four_bar):
     assert outward.name == "l_sole: CoP at the +y (left) edge"
     assert inward.travel > 1e-3
     assert outward.travel > 1e-3
+    nearest = found.nearest_active_set_change()  # whichever way: the touched one, at once
+    assert nearest.name == found.equilibrium.active[0].name
+    assert nearest.travel == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("y", [-0.02, 0.013, -1.05 * EDGE, 1.05 * EDGE])
+def test_four_bars_nearest_change_is_where_the_closed_form_says(four_bar, y):
+    here, _ = lateral(four_bar, y, four_bar.q)
+    nearest = copsense.cop_sensitivity(here, FAMILY, COP_ONLY).nearest_active_set_change()
+    assert nearest.criterion == FAMILY.name
+    assert nearest.kind == "cop"
+    assert nearest.binds == (abs(y) < EDGE)
+    assert nearest.travel == pytest.approx(abs(abs(y) - EDGE), rel=1e-9)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.041])
+@pytest.mark.parametrize("criterion", CRITERIA, ids=lambda c: c.name)
+def test_the_nearest_change_is_the_least_of_all_directions(icub, criterion, start):
+    # Each direction by its own ratio test, which follows one motion.
+    here, _ = lateral_posture(icub, start + float(icub.com[1]))
+    found = copsense.cop_sensitivity(here, criterion, LIMITS)
+    nearest, count = found.nearest_active_set_change(), 60
+    ways = [
+        found.com_motions @ [np.cos(angle), np.sin(angle)]
+        for angle in 2 * np.pi * np.arange(count) / count
+    ]
+    travels = [found.equilibrium.next_active_set_change(way) for way in ways]
+    least = min(travels, key=lambda change: change.travel)
+    assert nearest.travel <= least.travel <= nearest.travel / np.cos(np.pi / count)
+    assert (least.name, least.kind, least.binds) == (nearest.name, nearest.kind, nearest.binds)
 
 
 def test_nothing_changes_within_reach(four_bar):
@@ -160,6 +190,10 @@ def test_without_limits_nothing_changes(icub):
     found = copsense.cop_sensitivity(here, CRITERIA[0])
     assert found.next_active_set_change(tangent) is None
     assert found.next_active_set_change(-tangent) is None
+    assert found.nearest_active_set_change() is None
+    # Limits that no CoP, force or torque has either.
+    found = copsense.cop_sensitivity(here, CRITERIA[0], NO_LIMITS)
+    assert found.nearest_active_set_change() is None
 
 
 def test_bad_questions_are_rejected(icub):

@@ -194,6 +194,31 @@ def test_a_limit_that_the_tie_break_alone_presses_is_not_followed(corners):
     assert found.active[0].multiplier == 0.0
     with pytest.raises(InvalidInputError, match="the tie-break alone presses on l_sole"):
         found.next_active_set_change(corners.admissible_motions[:, 0])
+    with pytest.raises(InvalidInputError, match=r"the tie-break alone presses on .*Give the crit"):
+        found.nearest_active_set_change(corners.com_motions)
+
+
+def test_a_batch_has_no_nearest_change_where_the_tie_break_alone_presses(icub):
+    # On level ground no foot needs a tangential force: the tie-break chooses the rest.
+    level, limits = copsense.minimum_tangential(minimum_wrench(1.0)), Limits(cop_margin=0.025)
+    ahead = copsense.solve_posture(icub, com=(0.0, 0.03, None)).stance
+    q = np.array([icub.q, ahead.q])
+    tied = []
+    within = copsense.batch.evaluate_batch(icub, q, [level], limits).limits
+    for i, row in enumerate(q):
+        found = copsense.cop_sensitivity(icub.at(row), level, limits)
+        tied.append(bool(found.equilibrium._problem.tied.any()))
+        change = within.nearest_change(i, 0)
+        if tied[i]:
+            assert np.isnan(within.change_travel[i, 0])
+            assert change is None
+            with pytest.raises(InvalidInputError, match="Give the criterion a small share"):
+                found.nearest_active_set_change()
+        else:
+            nearest = found.nearest_active_set_change()
+            assert change.travel == pytest.approx(nearest.travel, rel=1e-9)
+            assert change.name == nearest.name
+    assert sorted(tied) == [False, True]
 
 
 def test_without_a_tie_break_it_says_so(corners):

@@ -143,6 +143,9 @@ def all_results(icub) -> dict[str, object]:
         "change to first order": copsense.cop_sensitivity(
             icub, TORQUE, LIMITS
         ).next_active_set_change(icub.com_motions[:, 1]),
+        "nearest change": copsense.cop_sensitivity(
+            icub, TORQUE, LIMITS
+        ).nearest_active_set_change(),
         "change": next_active_set_change(bar, TORQUE, copsense.Limits()),
         "posture": copsense.solve_posture(icub, com=(None, 0.01, None)),
         "path": path,

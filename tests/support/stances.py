@@ -3,6 +3,7 @@
 import numpy as np
 
 import copsense
+from copsense.batch import BatchKernel
 from copsense.criterion import TorqueTerm, WrenchTerm, reference_wrench
 from copsense.posture_system import supporting_joints
 from support.grounds import off_centre, on_tilted_planes, with_hand
@@ -28,6 +29,19 @@ def postures(stance, count, *, seed=0, size=0.2):
         except copsense.CopsenseError:
             continue
     return np.array(found)
+
+
+def tight(stance, q, share=0.5):
+    """Limits that press on about half of these postures, of every kind."""
+    own = BatchKernel(stance, served(stance), gains=False).evaluate(q)
+    f = own.wrenches
+    slip = np.hypot(f[..., 0], f[..., 1]) / np.abs(f[..., 2])
+    return copsense.Limits(
+        friction=min(float(np.quantile(slip.max(axis=-1), share)) + 0.02, 2.0),
+        torque=float(np.quantile(np.abs(own.torques).max(axis=-1), share)),
+        torsion=0.02,
+        cop_margin=0.005,
+    )
 
 
 def both_feet_and_hands(icub):

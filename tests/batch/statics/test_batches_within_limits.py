@@ -10,7 +10,7 @@ from support.grounds import off_centre, with_hand
 from support.one_sided import with_vertex
 from support.random_cases import Case
 from support.raw_qp import raw_problem
-from support.stances import CASES, postures, served, weighed
+from support.stances import CASES, postures, served, tight, weighed
 
 import copsense
 from copsense import Limits
@@ -23,19 +23,6 @@ from copsense.margins import limit_margins
 RELATIVE = 1e-9
 PER_CASE = 6  # times four criteria, ten cases; benchmarks/equality.py has 10 000 postures
 WITHIN, PRESSED, INFEASIBLE, UNLOADED = range(4)
-
-
-def tight(stance, q, share=0.5):
-    """Limits that press on about half of these postures, of every kind."""
-    own = BatchKernel(stance, served(stance), gains=False).evaluate(q)
-    f = own.wrenches
-    slip = np.hypot(f[..., 0], f[..., 1]) / np.abs(f[..., 2])
-    return Limits(
-        friction=float(np.quantile(slip.max(axis=-1), share)) + 0.02,
-        torque=float(np.quantile(np.abs(own.torques).max(axis=-1), share)),
-        torsion=0.02,
-        cop_margin=0.005,
-    )
 
 
 def differs(given, expected, floor):
@@ -88,6 +75,8 @@ def test_the_kernel_equals_the_reference_within_limits(answers, name, choose):
         if isinstance(error, InfeasibleError):
             assert state == INFEASIBLE
             assert within.relaxation[i] == pytest.approx(error.violation, rel=1e-6)
+            assert np.isnan(within.change_travel[i, j])
+            assert within.nearest_change(i, j) is None
             assert found.reasons[i, j].startswith(str(error)[:60])
             continue
         if isinstance(error, UnloadedContactError):
@@ -120,6 +109,12 @@ def test_the_kernel_equals_the_reference_within_limits(answers, name, choose):
         assert named == [(a.name, a.kind) for a in equilibrium.active if not a.weak]
         assert within.touching[i, j] == sum(a.weak for a in equilibrium.active)
         assert 0 <= within.optimality[i, j] < 1e-8
+        row, travel = equilibrium.nearest_changing_row(expected.com_motions)
+        assert within.change_travel[i, j] == pytest.approx(travel, rel=RELATIVE)
+        assert within.change_limit[i, j] == row
+        change, nearest = within.nearest_change(i, j), expected.nearest_active_set_change()
+        for what in ("criterion", "name", "kind", "binds"):
+            assert getattr(change, what) == getattr(nearest, what)
         unlimited = copsense.solve_equilibrium(stance.at(q[i]), criterion)
         for margins, of in ((within.margins, equilibrium), (within.own_margins, unlimited)):
             own = limit_margins(of, limits)
@@ -213,6 +208,9 @@ def test_both_sides_of_a_change_are_the_references(icub):
             break
         low, high = (middle, high) if at.limits.state[0, 0] == WITHIN else (low, middle)
     assert at.limits.touching[0, 0] == 1
+    change = at.limits.nearest_change(0, 0)  # what is only touched is met at once
+    assert change.travel == pytest.approx(0.0, abs=1e-8)  # a touch is of 1e-9 weights
+    assert change.binds
     q = chart.solve([middle]).configurations
     gains = kernel.one_sided_gains(q, at)
     expected = copsense.cop_sensitivity(icub.at(q[0]), copsense.minimum_torque(), limits)
@@ -278,6 +276,9 @@ def test_without_numba_the_reference_answers_within_limits_too(answers, monkeypa
     np.testing.assert_allclose(alone.torques, found.torques, rtol=0, atol=1e-9)
     np.testing.assert_allclose(alone.limits.margins, found.limits.margins, rtol=0, atol=1e-9)
     np.testing.assert_allclose(alone.limits.relaxation, found.limits.relaxation, rtol=1e-6, atol=0)
+    travels = alone.limits.change_travel, found.limits.change_travel
+    np.testing.assert_allclose(*travels, rtol=RELATIVE, atol=0)
+    np.testing.assert_array_equal(alone.limits.change_limit, found.limits.change_limit)
     assert alone.reasons.keys() == found.reasons.keys()
     for i, j in np.ndindex(alone.limits.state.shape):
         assert set(alone.limits.pressing[i, j]) == set(found.limits.pressing[i, j])
