@@ -491,7 +491,18 @@ class _Problem:
         rows: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """d f, d tau and d l of the held rows as the stance changes, with these rows held."""
-        base, joints, cost, bound = self.rates_of_data(at, change, rows)
+        return self._hold(at, change, held, self.rates_of_data(at, change, rows), rows)
+
+    def _hold(
+        self,
+        at: ConstrainedEquilibrium,
+        change: StanceChange,
+        held: np.ndarray,
+        data: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+        rows: np.ndarray | None = None,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What `differentiate` gives, from `rates_of_data`."""
+        base, joints, cost, bound = data
         if self.tie is None:
             df, _, dl = self.program.hold(held, cost, base, bound[held])
         else:
@@ -598,8 +609,9 @@ class _Problem:
         """The row that changes sides first along what these motions span, and its travel."""
         self.check_followed(np.flatnonzero(self.tied), at.row_multipliers)
         strong, along = np.flatnonzero(self.strong), StanceChange(motions)
-        df, _, dl = self.differentiate(at, along, strong)
-        rates = self.rates_of_data(at, along)[3] - self.A.dot(df)
+        data = self.rates_of_data(at, along)
+        df, _, dl = self._hold(at, along, strong, data)
+        rates = data[3] - self.A.dot(df)
         rates[strong] = dl
         left, unit = np.maximum(at.slack, 0.0), self.weight * self.scale
         left[strong] = at.row_multipliers[strong]
