@@ -1,5 +1,7 @@
 """A sweep is one dataset: labelled, with units, equal to what each posture gives on its own."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from support.grounds import with_hand
@@ -210,3 +212,25 @@ def test_a_sweep_gives_back_limits_that_are_infinite(stance_of):
         found = copsense.sweep(path, [TORQUE], limits)
         assert found.limits == limits
         assert repr(found)
+
+
+def test_a_sweep_within_limits_has_the_nearest_change_of_each_row(icub):
+    path = copsense.lateral_sweep(icub, -0.05, 0.05, 4)
+    limits = copsense.Limits(friction=0.33, cop_margin=0.004)
+    level = copsense.minimum_tangential(copsense.minimum_wrench(1.0))
+    criteria = [TORQUE, level]
+    found = copsense.sweep(path, criteria, limits)
+    told, names = found["change_travel"].values, found["change_limit"].values
+    for (i, here), (j, criterion) in product(enumerate(path.stances), enumerate(criteria)):
+        there = copsense.cop_sensitivity(here, criterion, limits)
+        if there.equilibrium._problem.tied.any():
+            assert np.isnan(told[i, j])
+            assert names[i, j] == ""
+            continue
+        change = there.nearest_active_set_change()
+        assert told[i, j] == pytest.approx(change.travel, rel=1e-9)
+        assert names[i, j] == change.name
+    assert np.isnan(told).sum() in (1, 2)
+    table = found.to_pandas()
+    assert {"active_limits", "change_travel", "change_limit"} <= set(table.columns)
+    assert "change_travel" not in copsense.sweep(path, [TORQUE])

@@ -84,6 +84,35 @@ class SweepRows:
         self.pulling: Bool[np.ndarray, "p c nc"] = np.zeros((*shape, sizes["contact"]), dtype=bool)
         self.reason: np.ndarray = np.full(shape, "", dtype=object)
         self.active: np.ndarray = np.full(shape, "", dtype=object)
+        self.change_travel: Float[np.ndarray, "p c"] = np.full(shape, np.nan)
+        self.change_limit: np.ndarray = np.full(shape, "", dtype=object)
+
+
+def with_changes(dataset: xr.Dataset, rows: SweepRows) -> xr.Dataset:
+    """A sweep's dataset within limits with those that are active, and their nearest change."""
+    first = ("posture", "criterion")
+    found: dict[str, Any] = {
+        "active_limits": (
+            first,
+            rows.active.astype(str),
+            {"long_name": "limits that hold with equality, the hardest pressed first"},
+        ),
+        "change_travel": (
+            first,
+            rows.change_travel,
+            {
+                "units": "m",
+                "long_name": "first-order distance the centre of mass may move, whichever way, "
+                "before a limit begins or ceases to press; infinite where none will",
+            },
+        ),
+        "change_limit": (
+            first,
+            rows.change_limit.astype(str),
+            {"long_name": "the limit that does; empty for none"},
+        ),
+    }
+    return dataset.assign(found)
 
 
 def sweep_dataset(path: PosturePath, rows: SweepRows, attributes: Mapping[str, str]) -> xr.Dataset:

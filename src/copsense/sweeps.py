@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from html import escape
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -34,7 +35,7 @@ from copsense.statics import (
     named_criteria,
     tie_break_note,
 )
-from copsense.sweep_layout import SweepRows, sweep_dataset
+from copsense.sweep_layout import SweepRows, sweep_dataset, with_changes
 from copsense.sweep_margins import with_limit_margins
 from copsense.sweep_sway import evaluate_row, passing_instant, with_sway
 from copsense.timed_path import Sway
@@ -60,6 +61,9 @@ _COLUMNS = (
     "cop_slope",
     "worst_case_gain",
     "pulling",
+    "active_limits",
+    "change_travel",
+    "change_limit",
     "residual",
     "reason",
     "torque",
@@ -345,7 +349,9 @@ def sweep(
         criteria: criteria with distinct names, or policies q -> wrenches (named by their function).
         limits: what the wrenches and torques must respect; None for nothing. The active ones of
             each row are then named in ``active_limits``, separated by semicolons, and every row has
-            its margins to them in ``limit_margin``.
+            its margins to them in ``limit_margin``. ``change_travel`` is how far the CoM may go
+            from there, whichever way and to first order, before ``change_limit`` begins or ceases
+            to press [m]; NaN where a tie-break alone presses.
         period: sway along the whole path and back in this time [s] instead of standing still at
             each posture, see `copsense.timed_path.Sway`: wrenches, torques, centres of pressure and
             margins carry the inertia, and ``cop_slope`` is along the sway; other derivatives hold
@@ -395,8 +401,7 @@ def sweep(
     if sway is not None:
         dataset = with_sway(dataset, sway, list(chosen.values()), limits)
     if limits is not None:
-        meaning = {"long_name": "limits that hold with equality, the hardest pressed first"}
-        dataset["active_limits"] = (("posture", "criterion"), rows.active.astype(str), meaning)
+        dataset = with_changes(dataset, rows)
         if limits.any:
             dataset = with_limit_margins(dataset, limits)
     excess = dataset["joint_limit_excess"].values
@@ -444,6 +449,9 @@ def _fill(rows: SweepRows, at: tuple[int, int], found: CopSensitivity, slope: np
     rows.pulling[at] = [c in equilibrium.pulling for c in equilibrium.stance.contact_names]
     if isinstance(equilibrium, ConstrainedEquilibrium):
         rows.active[at] = "; ".join(limit.name for limit in equilibrium.active)
+        with suppress(InvalidInputError):  # the tie-break alone presses: it stays NaN
+            i, rows.change_travel[at] = equilibrium.nearest_changing_row(found.com_motions)
+            rows.change_limit[at] = equilibrium.names[i] if i >= 0 else ""
 
 
 def _margins(found: CopSensitivity) -> list[tuple[float, str]]:

@@ -105,6 +105,9 @@ def test_a_sweep_within_limits_keeps_every_cop_on_its_sole(tmp_path):
         assert float(data["limit_margin"].min()) > -1e-6
         assert float(data["limit_margin"].sel(limit="r_sole: cop").isel(posture=-1).max()) < 1e-9
         assert data["active_limits"].isel(posture=4).values.tolist() == ["", ""]
+        assert data["change_travel"].attrs["units"] == "m"
+        assert (data["change_travel"].values > 0).all()
+        assert (data["change_limit"] != "").all()
 
 
 def test_infeasible_limits_are_rows_with_the_limits_in_conflict():
