@@ -212,6 +212,10 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
     assert ((states == 2) == (statuses == 3)).all()
     assert ((states == 4) == (statuses == 1)).all()
     assert (np.isnan(dataset["cop_within"].values).any((-1, -2)) == (states > 1)).all()
+    assert (np.isnan(dataset["change_travel"].values) == (states > 1)).all()
+    assert ((dataset["change_limit"].values == -1) == (states > 1)).all()
+    index = xr.open_zarr(path)["change_limit"].load()  # as docs/maps.md has it
+    names = dataset["limit_name"].isel(limit_name=index).where(index >= 0, "")
     for j, criterion in enumerate(both):
         counts = dict(zip(LIMIT_STATES, np.bincount(states[:, j], minlength=5), strict=True))
         assert summary.criteria[criterion.name].counts_within == counts
@@ -241,6 +245,10 @@ def test_limits_tell_the_feasible_from_the_infeasible(icub, both, tmp_path):
                 presses = len(within.equilibrium.pressing)
                 assert dataset["active_limits"].values[row, j] == presses
                 assert states[row, j] == (presses > 0)
+                change = within.nearest_active_set_change()
+                assert names.values[row, j] == change.name
+                stored = dataset["change_travel"].values[row, j]
+                assert stored == pytest.approx(change.travel, rel=1e-6)
                 for column, value in (
                     ("cop_within", within.cop),
                     ("com_gain_within", within.com_gain),
@@ -267,6 +275,8 @@ def test_a_contact_that_limits_leave_without_load_is_said_so(icub, both, tmp_pat
         found = copsense.solve_equilibrium(stance.at(q), both[1], limits)
         assert found.unloaded == (("hand",) if unloaded[row] else ())
         assert dataset["active_limits"].values[row] == len(found.pressing)
+        assert np.isnan(dataset["change_travel"].values[row]) == unloaded[row]
+        assert (dataset["change_limit"].values[row] == -1) == unloaded[row]
 
 
 def test_feet_and_joints_are_coordinates_too(icub, both, tmp_path):

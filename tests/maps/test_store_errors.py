@@ -86,7 +86,7 @@ def test_a_store_of_another_format_says_so(whole, icub, both, sample, tmp_path):
         lambda: copsense.load_map(path),
         lambda: copsense.maps.map_summary(path),
     ):
-        with pytest.raises(OutputError, match=r"of format 99.*format 5, which.*Give another path"):
+        with pytest.raises(OutputError, match=r"of format 99.*format 6, which.*Give another path"):
             use()
 
 

@@ -8,6 +8,8 @@ from copsense.batch import BatchKernel, BatchResult, PostureBatch, PostureChart
 from copsense.batch.statics.limit_states import IMPOSSIBLE, PRESSED, UNANSWERED, UNLOADED
 from copsense.errors import CopsenseError
 from copsense.maps.columns import (
+    CHANGE_LIMIT,
+    CHANGE_TRAVEL,
     EVALUATED,
     INFEASIBLE,
     REJECTED,
@@ -167,6 +169,9 @@ class ChunkEvaluator:
             "limit_margin": np.stack(margins, axis=-1),
             STATE_WITHIN: state,
             "active_limits": np.where(known, (limits.pressing >= 0).sum(axis=-1), -1),
+            # What the limits leave without load has multipliers that are not unique.
+            CHANGE_TRAVEL: np.where(state <= PRESSED, limits.change_travel, np.nan),
+            CHANGE_LIMIT: np.where(state <= PRESSED, limits.change_limit, -1),
             "cop_within": result.cops,
             "com_gain_within": result.com_gain,
         }

@@ -9,6 +9,7 @@ import numpy as np
 
 from copsense.batch import PostureChart
 from copsense.batch.statics.limit_states import LIMIT_STATES
+from copsense.limits import limit_rows
 from copsense.maps.map_plan import MapPlan
 from copsense.margins import MarginTable, margin_table
 from copsense.sweep_layout import variable_name
@@ -98,6 +99,7 @@ _LIMIT_MARGIN = Column(
     "they break the limits",
 )
 STATE_WITHIN = "state_within"
+CHANGE_TRAVEL, CHANGE_LIMIT = "change_travel", "change_limit"
 _WITHIN = {
     "limit_margin": _LIMIT_MARGIN,
     STATE_WITHIN: Column(
@@ -113,6 +115,19 @@ _WITHIN = {
         "int16",
         "",
         "number of limits that press within the limits; -1 where no wrenches within them are known",
+    ),
+    CHANGE_TRAVEL: Column(
+        _EACH,
+        "float32",
+        "m",
+        "first-order distance the centre of mass may move within the limits, whichever way, before "
+        "one begins or ceases to press; infinite where none will, NaN where it is not known",
+    ),
+    CHANGE_LIMIT: Column(
+        _EACH,
+        "int16",
+        "",
+        "index along limit_name of the limit that does; -1 for none",
     ),
     "cop_within": Column(
         (*_EACH, "contact", "axis"), "float32", "m", "centre of pressure within the limits"
@@ -181,6 +196,7 @@ def labels(plan: MapPlan) -> dict[str, tuple[str, ...]]:
     }
     if plan.limits is not None:
         found["limit"] = limit_kinds(margin_table(plan.stance, plan.limits))
+        found["limit_name"] = limit_rows(plan.stance, plan.limits).all_names
     if plan.configurations:
         found["configuration_index"] = tuple(map(str, range(plan.stance.robot.model.nq)))
     return found

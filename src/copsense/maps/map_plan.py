@@ -19,7 +19,7 @@ from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import named_criteria, with_tie_breaks
 from copsense.uncertainty import Source, Uncertainty, check_uncertain, sources_of
 
-FORMAT = 5  # of the store; counted up when what is written changes
+FORMAT = 6  # of the store; counted up when what is written changes
 _SMALL, _LARGE, _MANY = 4096, 16384, 16  # postures of a chunk; the large ones from 16 chunks on
 _SLOW = 128  # of one whose postures take tens of milliseconds each
 
