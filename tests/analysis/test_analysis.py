@@ -91,6 +91,40 @@ def test_limits_bring_active_limits_margins_and_travels(limited):
     row = limited.to_dict()["criteria"]["minimum-torque"]
     assert set(row["limit_travel"]) == set(row["next_change"]) == {"+y", "-y"}
     assert "is the last to meet a limit" in limited.verdict
+    change = limited.sensitivities["minimum-torque"].nearest_active_set_change()
+    assert analysis.nearest_change.travel == change.travel
+    assert row["nearest_change"] == {
+        "name": change.name,
+        "kind": "cop",
+        "binds": True,
+        "travel": change.travel,
+    }
+    assert analysis.nearest_change.travel < analysis.travels["+y"].first.first_order
+    line = f"CoM any way: {change.travel * 1e3:.1f} mm until {change.name} binds (first order)"
+    assert line in str(limited)
+
+
+def test_where_the_tie_break_alone_presses_the_changes_are_explained(icub):
+    level = copsense.minimum_tangential(copsense.minimum_wrench(1.0), name="level")
+    limits = copsense.Limits(cop_margin=0.025)
+    found = copsense.analyse(icub, [level], limits, com_y=0.03)
+    analysis = found.limit_analyses["level"]
+    assert analysis.nearest_change is None
+    assert not analysis.next_changes
+    assert found.to_dict()["criteria"]["level"]["nearest_change"] is None
+    (note,) = [note for note in found.notes if note.startswith("level: the next change of its")]
+    assert "the tie-break alone presses on l_sole" in note
+    assert "Give the criterion a small share" in note
+    assert "any way" not in str(found)
+
+
+def test_a_change_out_of_reach_is_not_printed(stance_of):
+    criteria = [copsense.minimum_wrench(1.0), copsense.minimum_torque()]
+    found = copsense.analyse(stance_of("four_bar"), criteria, copsense.Limits(friction=0.4))
+    far = found.limit_analyses["minimum-wrench"].nearest_change
+    assert 10 < far.travel < np.inf
+    assert str(found).count("any way") == 1
+    assert "CoM any way: 140.0 mm until l_sole: slips to +y binds" in str(found)
 
 
 def test_printed_it_is_the_command_s_table(analysis, limited):

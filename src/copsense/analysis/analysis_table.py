@@ -44,7 +44,7 @@ def text(data: dict[str, Any], joint_unit: Unit) -> str:
                 for column, word, width in zip(columns, line, widths, strict=True)
             ]
             lines.append(f"  {'  '.join(padded)}".rstrip())
-        lines += [f"  {line}" for line in _below(row)]
+        lines += [f"  {line}" for line in _below(row, data["com_span"])]
     return "\n".join([*lines, "", data["verdict"]])
 
 
@@ -58,7 +58,7 @@ def html(data: dict[str, Any], joint_unit: Unit) -> str:
             f"<tr>{''.join(f'<td>{markup.escape(word)}</td>' for word in line)}</tr>"
             for line in cells
         )
-        below = "<br>".join(map(markup.escape, _below(row)))
+        below = "<br>".join(map(markup.escape, _below(row, data["com_span"])))
         parts.append(
             f"<table><caption>{markup.escape(_title(name, row))}</caption><thead><tr>{head}</tr>"
             f"</thead><tbody>{body}</tbody></table>" + (f"<p>{below}</p>" if below else "")
@@ -92,9 +92,9 @@ def table(data: dict[str, Any]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _below(row: dict[str, Any]) -> tuple[str, ...]:
+def _below(row: dict[str, Any], span: float) -> tuple[str, ...]:
     """What stands under the table of one criterion."""
-    return (*limit_lines(row), *sway_lines(row), *spread_lines(row))
+    return (*limit_lines(row, span), *sway_lines(row), *spread_lines(row))
 
 
 def _heading(data: dict[str, Any]) -> Iterator[str]:

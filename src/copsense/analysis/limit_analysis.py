@@ -34,9 +34,13 @@ class LimitAnalysis:
         margins: distance of each contact and joint to each kind of limit.
         next_changes: side, ``"+y"`` or ``"-y"`` -> the next limit to bind or let go along the
             lateral path there, to first order and exact; either is None where none changes within
-            reach. Empty where the active limits are degenerate, so that it cannot be said.
+            reach. Empty where it cannot be said, as where the active limits are degenerate.
         travels: side -> how far the CoM may go until the criterion's own wrenches, unclipped, meet
             each limit.
+        nearest_change: the limit that begins or ceases to press first whichever way the CoM goes,
+            to first order, as `CopSensitivity.nearest_active_set_change`; None where none changes,
+            and where it cannot be said.
+        unknown: why not all changes can be said, and what to do; empty where they can.
     """
 
     active: tuple[ActiveLimit, ...]
@@ -44,6 +48,8 @@ class LimitAnalysis:
     margins: tuple[LimitMargin, ...]
     next_changes: Mapping[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]
     travels: Mapping[str, Travel]
+    nearest_change: ActiveSetChange | None = None
+    unknown: str = ""
 
     def __post_init__(self) -> None:
         """Own the mappings."""
@@ -66,16 +72,10 @@ class LimitAnalysis:
             "active_limits": [asdict(limit) for limit in self.active],
             "optimality": self.optimality,
             "limit_margins": [asdict(margin) for margin in self.margins],
+            "nearest_change": _predicted(self.nearest_change),
             "next_change": {
                 side: {
-                    "first_order": None
-                    if first is None
-                    else {
-                        "name": first.name,
-                        "kind": first.kind,
-                        "binds": first.binds,
-                        "travel": first.travel,
-                    },
+                    "first_order": _predicted(first),
                     "exact": None
                     if exact is None
                     else {"name": exact.name, "binds": exact.binds, "travel": exact.travel},
@@ -98,6 +98,18 @@ class LimitAnalysis:
         }
 
 
+def _predicted(change: ActiveSetChange | None) -> dict[str, Any] | None:
+    """A change to first order, as plain data."""
+    if change is None:
+        return None
+    return {
+        "name": change.name,
+        "kind": change.kind,
+        "binds": change.binds,
+        "travel": change.travel,
+    }
+
+
 def analyse_limits(
     path: LateralPath,
     criterion: Criterion,
@@ -116,24 +128,23 @@ def analyse_limits(
     """
     equilibrium = found.equilibrium
     assert isinstance(equilibrium, ConstrainedEquilibrium)
-    own = PathScan(path, criterion)
+    own, within = PathScan(path, criterion), PathScan(path, criterion, limits)
+    changes: dict[str, tuple[ActiveSetChange | None, ActiveSetChange | None]] = {}
+    nearest, unknown = None, ""
+    try:
+        nearest = found.nearest_active_set_change()
+        changes = {
+            side: (found.next_active_set_change(way * tangent), within.next_active_set_change(way))
+            for side, way in SIDES.items()
+        }
+    except CopsenseError as error:
+        unknown = str(error)
     return LimitAnalysis(
         tuple(equilibrium.active),
         equilibrium.optimality(),
         limit_margins(equilibrium, limits),
-        _next_changes(PathScan(path, criterion, limits), found, tangent),
+        changes,
         {side: own.travel(limits, way) for side, way in SIDES.items()},
+        nearest,
+        unknown,
     )
-
-
-def _next_changes(
-    scan: PathScan, found: CopSensitivity, tangent: Float[np.ndarray, " nv"]
-) -> dict[str, tuple[ActiveSetChange | None, ActiveSetChange | None]]:
-    """The next change of the active limits to either side; nothing where none can be found."""
-    try:
-        return {
-            side: (found.next_active_set_change(way * tangent), scan.next_active_set_change(way))
-            for side, way in SIDES.items()
-        }
-    except CopsenseError:
-        return {}

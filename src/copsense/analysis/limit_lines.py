@@ -12,11 +12,15 @@ def clipped(row: dict[str, Any]) -> bool:
     return any(limit["multiplier"] for limit in row.get("active_limits", ()))
 
 
-def limit_lines(row: dict[str, Any]) -> Iterator[str]:
+def limit_lines(row: dict[str, Any], span: float) -> Iterator[str]:
     """Lines on the limits of one criterion; none without limits.
 
     To the next change of the active limits the wrenches are those within the limits; to each limit
     they are the criterion's own.
+
+    Args:
+        row: the criterion's part of an analysis.
+        span: a length that the CoM's travel cannot exceed with the contacts in place [m].
     """
     if "limit_travel" not in row:
         return
@@ -27,13 +31,19 @@ def limit_lines(row: dict[str, Any]) -> Iterator[str]:
         else "tips, unloads: in the worst direction, to first order; along y, see below"
     )
     yield f"active limits: {'; '.join(_named(row['active_limits'])) or 'none'}"
+    nearest = row["nearest_change"]
+    if nearest is not None and nearest["travel"] <= span:
+        yield (
+            f"CoM any way: {nearest['travel'] * 1e3:4.1f} mm until {nearest['name']} "
+            f"{_verb(nearest)} (first order)"
+        )
     for side, change in row["next_change"].items():
         first, exact = change["first_order"], change["exact"]
         if row["active_limits"] and exact is not None:
             predicted = f"{first['travel'] * 1e3:.1f}" if first else "never"
             yield (
                 f"CoM to {side}: {exact['travel'] * 1e3:6.1f} mm until {exact['name']} "
-                f"{'binds' if exact['binds'] else 'lets go'} (first order: {predicted})"
+                f"{_verb(exact)} (first order: {predicted})"
             )
     if row["active_limits"]:
         yield "unclipped, the criterion's own wrenches:"
@@ -46,6 +56,11 @@ def limit_lines(row: dict[str, Any]) -> Iterator[str]:
             predicted = "met" if travel["exact"] == 0 else f"first order: {predicted}"
             distance = travel["exact"] * 1e3 + 0.0  # no minus before a zero
             yield f"CoM to {side}: {distance:6.1f} mm to {travel['name']} ({predicted})"
+
+
+def _verb(change: dict[str, Any]) -> str:
+    """What a limit does at a change."""
+    return "binds" if change["binds"] else "lets go"
 
 
 def _named(active: list[dict[str, Any]]) -> list[str]:

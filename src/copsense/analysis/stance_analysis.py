@@ -352,8 +352,7 @@ def _limit_notes(
             "a sole or a torque bound that this stance does not have."
         )
     return notes + [
-        f"the limits that {name} presses here are degenerate: the next change of them cannot be "
-        "said. Move a little."
+        f"{name}: the next change of its limits cannot be said: {analysis.unknown}"
         for name, analysis in limited.items()
-        if not analysis.next_changes
+        if analysis.unknown
     ]
