@@ -10,7 +10,8 @@ quantity there; exits with 1 if one is over 1e-9.
 
 With `--limits` the same within limits that press on about half of the postures, on five robots, one
 of them with its hands too: wrenches, derivatives and multipliers, both sides of the changes found
-between neighbours, every optimum's violation of its conditions, and for every infeasible posture
+between neighbours, the travel to the nearest change and the limit that changes, every optimum's
+violation of its conditions, and for every infeasible posture
 and a fifth of the others a linear program that says whether it has any wrench within the limits.
 """
 
@@ -188,8 +189,10 @@ WITHIN = (
     "romeo, flat",
     "icub, hands on wall and table",
 )
-LIMITED = (*WHAT[:-1], "multipliers", "one-sided", "at changes")
+LIMITED = (*WHAT[:-1], "multipliers", "change_travel", "one-sided", "at changes")
 COUNTED = ("pressed", "infeasible", "touching", "wrong", "wrong at changes")
+TIED = 1e-9  # relative difference of two limits' travels, of which either may be said to be first
+NEAREST = 1e-5  # m: of shorter travels the difference is relative to this
 EXACT = 1e-9  # weights: relaxation, of rows of norm one, that is none
 FLOOR = 1e-3  # of a quantity's size: gains where limits hold a CoP are zero but for rounding
 
@@ -268,6 +271,24 @@ def both_sides(expected):
     return both
 
 
+def compare_changes(within, i, j, expected):
+    """Relative difference of the travels to the nearest change; whether the limits differ."""
+    equilibrium, given = expected.equilibrium, within.change_travel[i, j]
+    row, travel = equilibrium.nearest_changing_row(expected.com_motions)
+    if not np.isfinite(travel):
+        return 0.0 if given == travel else np.inf, within.change_limit[i, j] != row
+    gap = abs(given - travel) / max(travel, NEAREST)
+    if within.change_limit[i, j] == row:
+        return gap, False
+    # The limit that the kernel names, by the rates of its slack or multiplier: is it as near?
+    other = within.change_limit[i, j]
+    pressed = other in equilibrium.pressing
+    rates = [equilibrium.rates(motion) for motion in expected.com_motions.T]
+    speed = np.hypot(*(r.multipliers[other] if pressed else r.slack[other] for r in rates))
+    left = equilibrium.row_multipliers[other] if pressed else equilibrium.slack[other]
+    return gap, abs(left / speed - travel) > TIED * max(travel, NEAREST)
+
+
 def compare_within(name, start, count):
     """Of one case: what `compare` gives, within limits."""
     stance = CASES[name]()
@@ -323,7 +344,13 @@ def compare_within(name, start, count):
                 errors[what] = max(errors[what], float(gap) if same else np.inf)
         presses = pressing[pressing >= 0]
         wrong = "wrong" if i < drawn_first else "wrong at changes"
-        counts[wrong] += set(presses.tolist()) != set(equilibrium.pressing.tolist())
+        if set(presses.tolist()) != set(equilibrium.pressing.tolist()):
+            counts[wrong] += 1
+            continue
+        if i < drawn_first:
+            gap, other = compare_changes(found.limits, i, j, expected)
+            errors["change_travel"] = max(errors["change_travel"], float(gap))
+            counts["wrong"] += int(other)
     optimality = float(np.nanmax(found.limits.optimality))
     return name, len(q), len(turns), counts, optimality, errors
 
@@ -345,14 +372,19 @@ def main_within(arguments):
     print("Within limits, largest relative difference of kernel and reference, four criteria a")
     print("posture. *changes*: postures among them at which a limit only touches, found between")
     print("neighbours; *pressed*, *infeasible*: answers; *wrong*: answers whose state differs from")
-    print("the reference's or a linear program's, or with other pressing limits; *optimality*: the")
     print(
-        "largest violation of an optimality condition. *At changes* a limit is within 1e-9 of the"
+        "the reference's or a linear program's, with other pressing limits, or with another limit"
+    )
+    print("that changes first unless two are as near; *optimality*: the largest violation of an")
+    print("optimality condition; *change travel*: how far the CoM may go before a limit begins or")
+    print(
+        "ceases to press, of travels under 10 um the difference over that. *At changes* a limit is"
     )
     print(
-        "weight of its bound, where either set of pressing limits is an optimum to that tolerance:"
+        "within 1e-9 of the weight of its bound, where either set of pressing limits is an optimum"
     )
-    print("counted apart, the largest difference of any quantity but the multipliers.\n")
+    print("to that tolerance: counted apart, the largest difference of any quantity but the")
+    print("multipliers.\n")
     head = [what.replace("_", " ") for what in LIMITED]
     titles = "case | postures | changes | pressed | infeasible | wrong | there | optimality"
     print(f"| {titles} | {' | '.join(head)} |")
