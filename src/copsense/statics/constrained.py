@@ -78,7 +78,7 @@ class ActiveLimit:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ActiveSetChange(ShortRepr):
-    """The next limit to begin or cease to press along a motion.
+    """The next limit to begin or cease to press along a motion, or the nearest of all motions.
 
     A prediction to first order from one posture has the first five; what a search along a path
     finds (`copsense.scan.next_active_set_change`) has them all.
@@ -88,7 +88,8 @@ class ActiveSetChange(ShortRepr):
         name: the limit's name.
         kind: as of `ActiveLimit`.
         binds: whether it begins to bind; False where it ceases to.
-        travel: how far along the motion, in units of it; of a path, of its coordinate.
+        travel: how far along the motion, in units of it: of the CoM's, metres; of a path, of its
+            coordinate.
         first_order: of a search, the travel predicted where it began; infinite if no change was. It
             may be another limit's.
         value: of a search, the path's coordinate there, such as world y of the CoM [m].
