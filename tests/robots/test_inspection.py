@@ -15,6 +15,7 @@ from support.tiny import urdf as tiny
 from support.walkers import BIPED, FOUR, FULL, PITCH_ONLY, walker, with_toes
 
 import copsense as cs
+from copsense.drives import Coupling, Spring
 from copsense.robots import inspect_robot, soles_read
 from copsense.robots.heading import upright_base
 
@@ -221,11 +222,41 @@ def test_the_command_prints_it_and_answers_in_json(tmp_path):
     assert answer.code == 0
     assert "walker: 18.6 kg" in answer.out
     assert "12 joints, 12 motors" in answer.out
-    assert "80 Nm" in answer.out
+    assert copsense("inspect", path, "--joints").out.count(" 80 Nm") == 12
     data = copsense("inspect", path, "--json").json
     assert data == json.loads(json.dumps(inspect_robot(path).to_dict()))
     assert data["feet"][0]["size"] == pytest.approx([0.2, 0.08])
     assert copsense("inspect", tmp_path / "none.urdf").error
+
+
+def test_an_inspection_is_as_short_as_its_feet_and_ends_with_the_line(tmp_path):
+    """The line that works is seen at once, however many joints there are."""
+    found = inspect_robot(written(tmp_path, walker()))
+    said, listed = str(found).splitlines(), found.text(joints=True).splitlines()
+    for text in (said, listed):
+        assert text[-2:] == ["to analyse it:", f"  {found.line}"]
+        assert [line.split(":")[0] for line in text if line.startswith(("faces", "lowest"))] == [
+            "faces",
+            "lowest at rest",
+        ]
+    assert said[1] == (
+        "every joint has a range; every motor has an effort limit (--joints lists them)"
+    )
+    assert not any("l_knee" in line for line in said[:-1])
+    assert [line.split()[0] for line in listed[1:13]] == [joint.name for joint in found.joints]
+    assert listed[13:] == said[2:]
+
+
+def test_an_inspection_counts_what_joints_and_motors_lack():
+    text = walker().replace('effort="80"', 'effort="50000"', 2)  # placeholders
+    text = re.sub('(name="l_knee" type=)"revolute"', r'\1"continuous"', text)
+    drives = cs.Drives(springs={"r_knee": Spring(40)}, couplings=(Coupling("r_yaw", "l_yaw", -1),))
+    found = inspect_robot(cs.Robot.from_urdf(text).with_drives(drives))
+    first, second = (joint.name for joint in found.joints[:2])
+    assert str(found).splitlines()[1] == (
+        f"1 of 12 joints lacks a range: l_knee; 2 of 11 motors lack an effort limit: {first}, "
+        f"{second}; 1 spring; 1 coupling (--joints lists them)"
+    )
 
 
 def test_a_sole_that_was_given_is_not_said_to_be_read():

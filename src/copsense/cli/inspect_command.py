@@ -19,6 +19,7 @@ from copsense.errors import InvalidInputError
     cls=SectionedCommand,
     epilog="\b\nExamples:\n"
     "  copsense inspect robot.urdf\n"
+    "  copsense inspect robot.urdf --joints\n"
     "  copsense inspect robot.urdf --package-dir ~/ros/share --json\n"
     "  copsense inspect robot.urdf --passive l_ankle --loop l_rod_end=l_heel\n"
     "  copsense inspect robot.urdf --contact l_toe:point --contact r_toe:point",
@@ -28,6 +29,9 @@ from copsense.errors import InvalidInputError
 @click.option("--root", metavar="BODY", help="Body of the robot, where an MJCF holds several.")
 @contact_options
 @drive_options
+@click.option(
+    "--joints", is_flag=True, help="List each joint: range, motor and effort limit, spring, loop."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def inspect(
     robot: str,
@@ -46,10 +50,11 @@ def inspect(
     held: tuple[str, ...],
     transmissions: tuple[str, ...],
     locked: tuple[str, ...],
+    joints: bool,
     as_json: bool,
     **touching: Any,
 ) -> None:
-    """Inspect ROBOT: mass, joints, motors, feet and soles, and the `analyse` line to paste.
+    """Inspect ROBOT: mass, joints, heading, feet and soles, and the `analyse` line to paste.
 
     ROBOT is a name from `copsense robots`, the path of a URDF, MJCF or SDF, or a stance file
     (.toml). Feet are found by geometry, what reaches lowest at rest, unless --contact names them.
@@ -88,7 +93,7 @@ def inspect(
     if as_json:
         echo_json(found.to_dict())
     else:
-        click.echo(str(found))
+        click.echo(found.text(joints=joints))
 
 
 _DRIVES = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -16,7 +16,7 @@ from copsense.content import ShortRepr
 from copsense.drives import Drives
 from copsense.errors import InvalidInputError
 from copsense.json_data import json_data
-from copsense.listing import listed
+from copsense.listing import counted, first_few, listed
 from copsense.robot import PLACEHOLDER_EFFORT, Robot
 from copsense.robots.analyse_line import AnalyseLine, first_that_stands, lines_to_try
 from copsense.robots.contact_soles import ContactAt, tip_text
@@ -59,12 +59,16 @@ class InspectedJoint:
     spring: float | None
     follows: str | None
 
+    @property
+    def has_range(self) -> bool:
+        """Whether its position has a limit, to one side at least."""
+        return bool(np.isfinite([self.lower, self.upper]).any())
+
     def __str__(self) -> str:
         """One line: range, motor, spring, what it follows."""
         scale, unit = (1e3, "mm") if self.unit == "m" else (180 / np.pi, "deg")
-        spans = np.isfinite([self.lower, self.upper]).any()
         low, high = self.lower * scale, self.upper * scale
-        span = f"{low:8.1f} .. {high:6.1f} {unit}" if spans else "without end"
+        span = f"{low:8.1f} .. {high:6.1f} {unit}" if self.has_range else "without end"
         force = "N" if self.unit == "m" else "Nm"
         drive = f"{self.effort:g} {force}" if np.isfinite(self.effort) else "no effort limit"
         if self.placeholder is not None:
@@ -134,18 +138,25 @@ class Inspection(ShortRepr):
         )
 
     def __str__(self) -> str:
-        """Mass, joints, feet, notes, and the line to paste."""
+        """Mass, what joints lack, heading, feet, notes, and the line to paste."""
+        return self.text()
+
+    def text(self, *, joints: bool = False) -> str:
+        """What was found, the line to paste last.
+
+        Args:
+            joints: with a line for each joint and loop, instead of one that counts what they lack.
+        """
         robot = self.robot
         gravity = ", ".join(f"{g:g}" for g in robot.model.gravity.linear)
-        width = max((len(joint.name) for joint in self.joints), default=0)
         lines = [
             f"{robot.name}: {robot.mass:.4g} kg, gravity ({gravity}) m/s^2, "
-            f"{len(self.joints)} joints, {len(robot.torque_names)} motors, base {robot.base_frame}",
-            *(f"  {joint.name:{width}}  {joint}" for joint in self.joints),
-            *(f"  loop {loop.name} ({loop.kind})" for loop in robot.drives.loops),
+            f"{counted(len(self.joints), 'joint')}, {counted(len(robot.torque_names), 'motor')}, "
+            f"base {robot.base_frame}",
+            *(self._joint_lines() if joints else self._joint_summary()),
+            "faces: " + _facing(self.heading, self.heading_reason),
             "lowest at rest:" if self.feet else "lowest at rest: nothing was found",
             *_feet_lines(self.feet),
-            "faces: " + _facing(self.heading, self.heading_reason),
         ]
         lines += [f"note: {note}" for note in self.notes]
         if self.line is None:
@@ -153,6 +164,31 @@ class Inspection(ShortRepr):
         else:
             lines += ["to analyse it:", f"  {self.line}"]
         return "\n".join(lines)
+
+    def _joint_lines(self) -> list[str]:
+        width = max((len(joint.name) for joint in self.joints), default=0)
+        return [
+            *(f"  {joint.name:{width}}  {joint}" for joint in self.joints),
+            *(f"  loop {loop.name} ({loop.kind})" for loop in self.robot.drives.loops),
+        ]
+
+    def _joint_summary(self) -> list[str]:
+        """One line: what joints lack, how many are sprung, coupled or closed in loops."""
+        if not self.joints:
+            return []
+        motors = [joint for joint in self.joints if joint.motor]
+        said = [_lacking(self.joints, "joint", "a range", lambda joint: joint.has_range)]
+        if motors:
+            said.append(
+                _lacking(motors, "motor", "an effort limit", lambda joint: joint.effort < np.inf)
+            )
+        others = {
+            "spring": sum(joint.spring is not None for joint in self.joints),
+            "coupling": sum(joint.follows is not None for joint in self.joints),
+            "loop": len(self.robot.drives.loops),
+        }
+        said += [counted(number, noun) for noun, number in others.items() if number]
+        return [f"{'; '.join(said)} (--joints lists them)"]
 
 
 def inspect_robot(
@@ -325,6 +361,19 @@ def _turned(
     if any(rpy):
         turned[3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(*np.radians(rpy))).coeffs()
     return turned
+
+
+def _lacking(
+    joints: Sequence[InspectedJoint], noun: str, what: str, has: Callable[[InspectedJoint], bool]
+) -> str:
+    """Whether every joint has something, or how many lack it, and the first of them."""
+    without = [joint.name for joint in joints if not has(joint)]
+    if not without:
+        return f"every {noun} has {what}"
+    if len(without) == len(joints):
+        return f"no {noun} has {what}"
+    lack = "lacks" if len(without) == 1 else "lack"
+    return f"{len(without)} of {len(joints)} {noun}s {lack} {what}: {first_few(without, 3)}"
 
 
 def _feet_lines(feet: Sequence[Foot]) -> list[str]:
