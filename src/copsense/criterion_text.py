@@ -1,10 +1,11 @@
-"""Criterion text: a criterion in one word, as the command line and the explorer write it."""
+"""Criterion text: a criterion in one word, as commands, stance files and plans write it."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 from copsense.criterion import CRITERIA, Criterion, criterion_named, weighted_torque
 from copsense.errors import InvalidInputError, UnknownNameError
@@ -48,6 +49,38 @@ def criterion_from_text(text: str, characteristic_length: float = 1.0) -> Criter
     if kind not in _READERS:
         raise UnknownNameError("criterion with numbers", kind, _READERS)
     return _READERS[kind](text, listed)
+
+
+def criterion_from_data(data: object, characteristic_length: float = 1.0) -> Criterion:
+    """The criterion that a file says.
+
+    Args:
+        data: a text, as `criterion_from_text` reads it, or a table of `Criterion.to_dict`.
+        characteristic_length: L [m] of a text, as `criterion_from_text` takes it.
+
+    Raises:
+        UnknownNameError: no such criterion, or a key or kind of term that a table does not have.
+        InvalidInputError: what is not understood, or is neither text nor table.
+    """
+    if isinstance(data, str):
+        return criterion_from_text(data, characteristic_length)
+    if not isinstance(data, Mapping):
+        raise InvalidInputError(
+            f"the criterion {data!r} in a file is neither a text nor a table. Write it as "
+            f"--criterion takes it, such as 'minimum-torque' or {_EXAMPLES[0]!r}, or the table "
+            "that Criterion.to_dict() gives."
+        )
+    return Criterion.from_dict(data)
+
+
+def criterion_data(criterion: Criterion) -> str | dict[str, Any]:
+    """What `criterion_from_data` reads back: the criterion's name where that says it all."""
+    try:
+        if criterion_from_text(criterion.name) == criterion:
+            return criterion.name
+    except (InvalidInputError, UnknownNameError):
+        pass  # a name of its own
+    return criterion.to_dict()
 
 
 def _read_stiffness(text: str, listed: str) -> Criterion:

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from support.commands import copsense
 
+from copsense import Limits
 from copsense.comparison import (
     ControllerChoice,
     PostureChoice,
@@ -17,7 +18,11 @@ from copsense.comparison import (
     read_plan,
 )
 from copsense.comparison.trials import Breaking, Falls
+from copsense.errors import InvalidInputError
 from copsense.plots import plot_benchmark, render_figure
+from copsense.stiffness import stiffness
+
+STIFF = "stiffness:2000"
 
 PLAN = """
 [robots.narrow]
@@ -138,6 +143,65 @@ def test_a_stance_file_is_benchmarked_with_its_limits_and_criteria(tmp_path):
         (("--plan", "plan.toml"), "leave --stance out"),
     ):
         assert said in copsense("benchmark", "--stance", stance, *more).error
+
+
+TWO = {
+    "careful": 'robot = "icub"\ncriteria = ["weighted-torque:hip=2"]\nlimits.friction = 0.5\n',
+    "plain": 'robot = "icub"\n',
+}
+
+
+@pytest.fixture
+def two_stances(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in TWO.items():
+        Path(f"{name}.toml").write_text(text, encoding="utf-8")
+
+
+@pytest.mark.usefixtures("two_stances")
+def test_several_stance_files_are_benchmarked_each_with_its_limits_and_criteria(monkeypatch):
+    plans = []
+
+    def keep(plan, *_, **__):
+        plans.append(plan)
+        raise InvalidInputError("Enough.")
+
+    monkeypatch.setattr("copsense.comparison.run_benchmark", keep)
+
+    def planned(*options):
+        answer = copsense("benchmark", "careful.toml", "plain.toml", "icub", *options)
+        assert answer.error == "error: Enough."
+        found = {}
+        for case in plans.pop():
+            found.setdefault(case.robot.name, []).append(case.controller)
+        return answer.err, found
+
+    short = ("--disturbance", "rest", "--posture", "own")
+    said, found = planned(*short)
+    assert said.count("limits from careful.toml: friction=0.5.") == 1
+    both = ["minimum-wrench", "minimum-torque"]
+    assert [c.name for c in found["careful"]] == ["weighted-torque:hip=2 within limits"]
+    assert [c.name for c in found["plain"]] == [c.name for c in found["icub"]] == both
+    assert found["careful"][0].limits == Limits(friction=0.5)
+    said, found = planned(*short, "--criterion", STIFF, "--limits", "friction=0.9")
+    assert "limits from" not in said
+    for controllers in found.values():
+        assert [c.build_criterion() for c in controllers] == [stiffness({"*": 2000.0}, name=STIFF)]
+        assert [c.limits for c in controllers] == [Limits(friction=0.9)]
+
+
+@pytest.mark.usefixtures("two_stances")
+def test_a_plan_says_that_limits_and_criteria_of_its_stance_files_are_not_used():
+    names = "".join(f'[robots.{name}]\nsource = "{name}.toml"\n' for name in TWO)
+    controller = '[controllers.one]\ncriterion = "weighted-torque:knee=3"\n[trials.rest]\n'
+    Path("plan.toml").write_text(names + controller, encoding="utf-8")
+    answer = copsense("benchmark", "--plan", "plan.toml", "--jobs", 1, "--json")
+    assert answer.code == 0, answer.err
+    said = [note for note in answer.json["notes"] if "not used" in note]
+    assert said == [
+        "the limits and criteria of careful.toml are not used: a plan says them under "
+        "[controllers]."
+    ]
 
 
 def test_a_failed_run_makes_the_exit_code_one(tmp_path):

@@ -12,6 +12,7 @@ import copsense
 from copsense import Contact, Limits, Load
 from copsense.batch import chart_posture
 from copsense.cli import copsense as command
+from copsense.criterion_text import criterion_from_text
 from copsense.errors import (
     CopsenseError,
     InvalidInputError,
@@ -69,6 +70,63 @@ def test_loads_payloads_limits_and_criteria_come_back(icub, tmp_path):
     assert list(read.criteria) == criteria
     with pytest.raises(OutputError, match=r"stance\.toml exists already\. .*--force-stance "):
         save_stance(stance, file)
+
+
+NAMED = [
+    "minimum-wrench",
+    "limit-weighted-torque",
+    "weighted-torque:hip=2,knee=1,rest=0.5",
+    "stiffness:hip=4000,ankle=1000,rest=2000,mx=2800,my=700",
+]
+
+
+def test_a_file_takes_the_texts_of_the_option_and_writes_them_back(icub, tmp_path):
+    file = tmp_path / "stance.toml"
+    expected = [criterion_from_text(text) for text in NAMED]
+    file.write_text(f'robot = "icub"\ncriteria = {json.dumps([*NAMED, NAMED[0]])}\n')
+    assert list(StanceFile.read(file).criteria) == expected
+    own = copsense.minimum_wrench(0.2)  # no text says its length
+    save_stance(icub, file, criteria=[*expected, own], overwrite=True)
+    written = StanceFile.read(file)
+    assert written.data["criteria"] == [*NAMED, own.to_dict()]
+    assert list(written.criteria) == [*expected, own]
+
+
+def test_the_command_keeps_criteria_as_they_were_named(tmp_path):
+    file = tmp_path / "stance.toml"
+    words = [word for text in NAMED[2:] for word in ("--criterion", text)]
+    assert run_command("analyse", "icub", *words, "--save-stance", file).code == 0
+    assert StanceFile.read(file).data["criteria"] == NAMED[2:]
+    assert list(run_command("analyse", "--stance", file, "--json").json["criteria"]) == NAMED[2:]
+
+
+@pytest.mark.parametrize(
+    "text", ["minimum-torqe", "weighted-torque:hip=0", "stiffness:hip=stiff", "stiffness", "a:b=1"]
+)
+def test_a_file_rejects_a_criterion_as_the_option_does(tmp_path, text):
+    file = tmp_path / "stance.toml"
+    file.write_text(f'robot = "icub"\ncriteria = ["{text}"]\n')
+    expected = run_command("analyse", "icub", "--criterion", text).error
+    assert run_command("analyse", file).error == f"{expected} The stance file is {file}."
+
+
+@pytest.mark.parametrize(
+    ("value", "said"), [('"minimum-torque"', "Write a list"), ("[3]", "neither a text nor a table")]
+)
+def test_criteria_of_a_file_that_are_no_list_or_no_criterion_are_one_clear_error(
+    tmp_path, value, said
+):
+    file = tmp_path / "stance.toml"
+    file.write_text(f'robot = "icub"\ncriteria = {value}\n')
+    assert said in run_command("analyse", file).error
+
+
+def test_a_length_beside_the_criteria_of_a_file_is_rejected(tmp_path):
+    file = tmp_path / "stance.toml"
+    file.write_text('robot = "icub"\ncriteria = ["minimum-wrench"]\n')
+    length = ("--characteristic-length", "0.1")
+    assert "--criterion minimum-wrench." in run_command("analyse", file, *length).error
+    assert run_command("analyse", file, *length, "--criterion", "minimum-wrench").code == 0
 
 
 def test_drives_and_locked_joints_come_back(tmp_path):

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any, cast
 import click
 
 from copsense.cli.controller_options import control_period_option
-from copsense.cli.criterion_options import criterion_options
-from copsense.cli.limit_options import read_limits
+from copsense.cli.criterion_options import check_length_of, criterion_options
+from copsense.cli.limit_options import limits_of, read_limits
 from copsense.cli.option_lists import F, SectionedCommand
 from copsense.cli.place_options import place_options
 from copsense.cli.printing import PICTURES, echo_json, echo_notes, echo_written
@@ -24,6 +24,7 @@ from copsense.cli.stance_options import read_stance, standing_options
 from copsense.cli.units import Unit, read_quantity
 from copsense.errors import InvalidInputError
 from copsense.extras import require
+from copsense.listing import listed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -136,7 +137,8 @@ def benchmark(
         _check_alone(robots, {*options, "stance_file"})
         plan = read_plan(plan_file)
     check_plan(plan)
-    notes = _check_robots(plan)
+    notes = _check_robots(plan) + (_unused(plan) if plan_file is not None else [])
+    echo_notes(notes)
     kept = 0
     if output is not None:
         path = check_output(output, suffixes=(".csv",), overwrite=True)
@@ -208,40 +210,56 @@ def _plan(
     **standing: Any,
 ) -> tuple[Case, ...]:
     """The cases that the options ask for."""
-    from copsense.comparison import (
-        Conditions,
-        ControllerChoice,
-        RobotChoice,
-        make_plan,
-    )
+    from copsense.comparison import Conditions, RobotChoice, make_plan
     from copsense.simulation import Scenario
 
     usual_period = control_period == Scenario.control_period
     conditions = Conditions(values=None if usual_period else {"control_period": control_period})
-    within = read_limits(limits)
-    file = remembered_stance()
-    chosen_criteria: list[str | Mapping[str, Any]] = list(dict.fromkeys(criteria))
-    if not criteria and file is not None:
-        chosen_criteria = [criterion.to_dict() for criterion in file.criteria]
-    controllers: list[ControllerChoice] = [
-        ControllerChoice(criterion, characteristic_length, gains, within)
-        for criterion in chosen_criteria or ("minimum-wrench", "minimum-torque")
-    ]
+    controllers = {
+        robot: _controllers(robot, criteria, characteristic_length, gains, limits)
+        for robot in dict.fromkeys(robots)
+    }
     trials = _trials(disturbances or ("lean", "push", "sway"), repeats, seed, quick)
     words = [text for text in dict.fromkeys(postures) if not _places_joints(text)]
     contacts = standing["contacts"]
     if len(words) < len(set(postures)) or _stands_apart(standing):
         placed = [text for text in postures if _places_joints(text)]
         stances = _stances(robots, words or ["own"], placed, standing)
-        pairs = [([robot], [posture]) for robot, posture in stances]
+        pairs = [(robot, [posture]) for robot, posture in stances]
     else:
         choices = [RobotChoice(source, contacts=contacts) for source in dict.fromkeys(robots)]
-        pairs = [([robot], _usual(robot, words, quick)) for robot in choices]
+        pairs = [(robot, _usual(robot, words, quick)) for robot in choices]
     return tuple(
         case
-        for chosen, ways in pairs
-        for case in make_plan(chosen, ways, controllers, trials, [conditions])
+        for robot, ways in pairs
+        for case in make_plan([robot], ways, controllers[robot.source], trials, [conditions])
     )
+
+
+def _controllers(
+    robot: str,
+    criteria: Sequence[str],
+    characteristic_length: float,
+    gains: str,
+    limits: str | None,
+) -> list[ControllerChoice]:
+    """The controllers of a robot: what the options say, or its stance file, or the usual ones."""
+    from copsense.comparison import ControllerChoice
+    from copsense.robots import StanceFile
+    from copsense.robots.stance_tables import is_stance_file
+
+    file = remembered_stance()
+    if file is None and is_stance_file(robot):
+        file = StanceFile.read(robot)
+    chosen: list[str | Mapping[str, Any]] = list(dict.fromkeys(criteria))
+    if not chosen and file is not None and file.criteria:
+        check_length_of(file)
+        chosen = [criterion.to_dict() for criterion in file.criteria]
+    within = limits_of(file) if limits is None else read_limits(limits)
+    return [
+        ControllerChoice(criterion, characteristic_length, gains, within)
+        for criterion in chosen or ("minimum-wrench", "minimum-torque")
+    ]
 
 
 def _places_joints(text: str) -> bool:
@@ -321,7 +339,7 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
     """Reject robots and frames that do not exist: a mistyped name is not a failed row.
 
     Returns:
-        The robots' notes, which are printed.
+        The robots' notes.
     """
     from copsense.robots import PRESETS, load_robot, load_stance
     from copsense.robots.stance_tables import is_stance_file
@@ -341,8 +359,22 @@ def _check_robots(plan: Sequence[Case]) -> list[str]:
             for frame in frames:
                 robot.frame(frame)
             notes += [f"{robot.name}: {note}" for note in robot.notes]
-    notes = list(dict.fromkeys(notes))
-    echo_notes(notes)
+    return list(dict.fromkeys(notes))
+
+
+def _unused(plan: Sequence[Case]) -> list[str]:
+    """A sentence for each stance file of a plan whose limits or criteria the plan replaces."""
+    from copsense.robots import StanceFile
+    from copsense.robots.stance_tables import is_stance_file
+
+    notes = []
+    for source in dict.fromkeys(c.robot.source for c in plan if is_stance_file(c.robot.source)):
+        data = StanceFile.read(source).data
+        said = listed([key for key in ("limits", "criteria") if data.get(key)])
+        if said:
+            notes.append(
+                f"the {said} of {source} are not used: a plan says them under [controllers]."
+            )
     return notes
 
 

@@ -14,6 +14,7 @@ from copsense.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from copsense.criterion import Criterion
+    from copsense.robots import StanceFile
 
 
 def criterion_options(command: F) -> F:
@@ -75,11 +76,31 @@ def read_criteria(names: tuple[str, ...], characteristic_length: float) -> list[
     )
 
 
+def check_length_of(file: StanceFile) -> None:
+    """Reject ``--characteristic-length`` beside the criteria of a stance file, which have theirs.
+
+    Raises:
+        InvalidInputError: it is given.
+    """
+    given = click.get_current_context().get_parameter_source("characteristic_length")
+    if given is click.core.ParameterSource.COMMANDLINE:
+        raise InvalidInputError(
+            f"the criteria come from {file.path}, each with its own length, and "
+            "--characteristic-length gives another. Name the criterion that it is for as well: "
+            "--criterion minimum-wrench."
+        )
+
+
 def given_criteria(names: tuple[str, ...], characteristic_length: float) -> list[Criterion]:
-    """The criteria named, or those of the stance file, or none: each command has its default."""
+    """The criteria named, or those of the stance file, or none: each command has its default.
+
+    Raises:
+        InvalidInputError: a characteristic length beside the file's criteria.
+    """
     from copsense.criterion_text import criterion_from_text
 
     file = remembered_stance()
-    if not names and file is not None:
+    if not names and file is not None and file.criteria:
+        check_length_of(file)
         return list(file.criteria)
     return [criterion_from_text(name, characteristic_length) for name in dict.fromkeys(names)]

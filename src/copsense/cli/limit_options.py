@@ -15,6 +15,7 @@ from copsense.errors import InvalidInputError, UnknownNameError
 
 if TYPE_CHECKING:
     from copsense.limits import Limits
+    from copsense.robots import StanceFile
 
 # What a number means where it is not a force; it may be written with its unit.
 _UNITS: dict[str, Unit | None] = {
@@ -46,15 +47,11 @@ def limits_option(command: F) -> F:
 
 
 def read_limits(text: str | None) -> Limits | None:
-    """The limits that ``--limits`` describes, or None."""
+    """The limits that ``--limits`` describes, or the stance file's, or None."""
     from copsense.limits import LIMIT_NAMES, Limits
 
     if text is None:
-        file = remembered_stance()
-        kept = None if file is None else file.limits
-        if file is not None and kept is not None:
-            echo_notes([f"limits from {file.path}: {_said(kept)}."])
-        return kept
+        return limits_of(remembered_stance())
     values: dict[str, Any] = {}
     for part in filter(None, text.split(",")):
         name, _, value = part.partition("=")
@@ -69,6 +66,14 @@ def read_limits(text: str | None) -> Limits | None:
             raise InvalidInputError(f"the limit {name} is given twice. Give it once.")
         values[LIMIT_NAMES[name]] = _limit_value(name, value)
     return Limits(**values)
+
+
+def limits_of(file: StanceFile | None) -> Limits | None:
+    """The limits of a stance file, which are said, or None."""
+    kept = None if file is None else file.limits
+    if file is not None and kept is not None:
+        echo_notes([f"limits from {file.path}: {_said(kept)}."])
+    return kept
 
 
 def _said(limits: Limits) -> str:

@@ -11,7 +11,8 @@ from copsense.arrays import finite_number
 from copsense.contact import Contact, rectangle
 from copsense.content import freeze, plain
 from copsense.controllers import STIFF, Gains, public_gains
-from copsense.criterion import Criterion, criterion_named
+from copsense.criterion import Criterion
+from copsense.criterion_text import criterion_from_data
 from copsense.errors import InvalidInputError, UnknownNameError
 from copsense.limits import Limits
 from copsense.robot import Robot
@@ -192,7 +193,8 @@ class ControllerChoice:
     """A balancing controller.
 
     Attributes:
-        criterion: the criterion that shares the load: its name, or a table as
+        criterion: the criterion that shares the load: a text, as
+            `copsense.criterion_text.criterion_from_text` reads it, or a table, as
             `Criterion.to_dict` writes it.
         characteristic_length: L of minimum-wrench [m].
         gains: ``"stiff"`` or ``"public"``.
@@ -230,10 +232,8 @@ class ControllerChoice:
         return self.limits is not None and self.limits.any
 
     def build_criterion(self) -> Criterion:
-        """The criterion with that name, or of that table."""
-        if not isinstance(self.criterion, str):
-            return Criterion.from_dict(self.criterion)
-        return criterion_named(self.criterion, self.characteristic_length)
+        """The criterion of that text, or of that table."""
+        return criterion_from_data(self.criterion, self.characteristic_length)
 
     def gains_of(self, robot: Robot) -> Gains:
         """The gains for a robot."""

@@ -12,7 +12,8 @@ instead, and whole contacts, and is not solved again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -141,18 +142,18 @@ class StanceFile:
 
         if "limits" not in self.data:
             return None
-        table = table_of(self.data["limits"], "limits")
-        return Limits.from_dict({k: None if v == "off" else v for k, v in table.items()})
+        with self._named_in_errors():
+            table = table_of(self.data["limits"], "limits")
+            return Limits.from_dict({k: None if v == "off" else v for k, v in table.items()})
 
     @property
     def criteria(self) -> tuple[Criterion, ...]:
         """The criteria in the file; none where it has none."""
-        from copsense.criterion import Criterion, criterion_named
+        from copsense.criterion_text import criterion_from_data
 
-        return tuple(
-            criterion_named(each) if isinstance(each, str) else Criterion.from_dict(each)
-            for each in list_of(self.data.get("criteria", []), "criteria")
-        )
+        with self._named_in_errors():
+            given = list_of(self.data.get("criteria", []), "criteria")
+            return tuple(dict.fromkeys(map(criterion_from_data, given)))
 
     def stance(self) -> Stance:
         """The stance.
@@ -160,9 +161,14 @@ class StanceFile:
         Raises:
             CopsenseError: anything wrong with what the file says; the message names the file.
         """
-        try:
+        with self._named_in_errors():
             self._check_source()
             return self._stance()
+
+    @contextmanager
+    def _named_in_errors(self) -> Iterator[None]:
+        try:
+            yield
         except CopsenseError as error:
             error.add_note(f"The stance file is {self.path}.")
             raise
@@ -319,6 +325,7 @@ def stance_data(
     Raises:
         InvalidInputError: where the robot came from is not known, or is another robot.
     """
+    from copsense.criterion_text import criterion_data
     from copsense.robots.standing import load_robot
 
     source = _source_of(stance.robot) if robot is None else str(robot)
@@ -347,7 +354,7 @@ def stance_data(
         table = {k: "off" if v is None else v for k, v in limits.to_dict().items()}
         data["limits"] = table
     if criteria:
-        data["criteria"] = [criterion.to_dict() for criterion in criteria]
+        data["criteria"] = [criterion_data(criterion) for criterion in criteria]
     data["payloads"] = [
         {"frame": p.frame, "mass_kg": p.mass, "com_m": list(p.com)} for p in stance.robot.payloads
     ]
