@@ -19,6 +19,8 @@ from copsense.errors import CopsenseError
 from copsense.loads import SpringLoad
 from copsense.magnitudes import MagnitudeWarning
 from copsense.maps import Axis, Grid, map_postures
+from copsense.optimisation import optimise, pareto_front
+from copsense.optimisation.question import required_of
 from copsense.path import LateralPath, com_sweep
 from copsense.reach import robot_reach
 from copsense.regions import com_region
@@ -75,6 +77,8 @@ LENGTHS = [
         0.07,
     ),
     (lambda s: com_region(s, Limits(), tolerance=1), 1, 0.001),
+    (lambda s: optimise(s, objective="gain", require={"travel": 40}), 40, 0.04),
+    (lambda s: pareto_front(s, ("gain", "torque"), require={"sideways": 40}), 40, 0.04),
     (lambda s: read_sole(s.robot, Contact("l_foot"), thickness=1), 1, 0.001),
 ]
 # Call, the degrees that it may mean, and what those are [rad].
@@ -118,10 +122,24 @@ def test_what_may_be_meant_and_hardly_is_is_done_and_doubted(stance):
         (lambda: Contact("l_foot", friction=60), "'l_foot': friction is 60.* 60 % are 0.6"),
         (lambda: Limits(friction=60), "limit friction is 60.* 60 % are 0.6"),
         (lambda: Limits(friction={"l_foot": 80}), "'l_foot' is 80.* 80 % are 0.8"),
+        (lambda: required_of(stance, {"torque": 15000}), "15000 Nmm are 15 Nm"),
     ]
     for call, said in hardly:
         with pytest.warns(MagnitudeWarning, match=said):
             assert call() is not None
+
+
+def test_what_no_posture_can_have_is_not_searched_for(stance):
+    for require, said in (
+        ({"margin": 30}, "a share of a limit, 1 at most: 30 % are 0.3"),
+        ({"push": 4000.0}, f"up to the robot's weight, {stance.robot.weight:.4g} N"),
+    ):
+        with pytest.raises(CopsenseError, match=said):
+            optimise(stance, objective="gain", require=require)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        bounds = {"margin": 1.0, "push": 40.0, "travel": 1.0, "torque": 60.0, "gain": 9.0}
+        assert required_of(stance, bounds) == bounds
 
 
 def test_drives_of_another_unit_and_soles_in_each_other_are_doubted(stance):

@@ -16,6 +16,7 @@ LONGEST_SOLE = 5.0  # m
 _MASSES = 3.0  # of a robot, from which its payload is doubted
 _STICKY = 20.0  # times the normal force, from which friction is doubted
 _BEYOND = 10.0  # times its range, from which a slide's position is not metres
+_STRONG = 10.0  # times the weight at its reach, from which a torque is doubted
 _TURN = 2 * math.pi * (1 + 1e-9)
 
 
@@ -116,6 +117,18 @@ def doubt_payload(kilograms: float, robot: str, mass: float, what: str) -> None:
         warnings.warn(
             f"{what} is {kilograms:.4g} kg, {abs(kilograms) / mass:.3g} times the mass of "
             f"{robot!r}. Masses are in kilograms: {kilograms:.4g} g are {kilograms / 1e3:.4g} kg.",
+            MagnitudeWarning,
+            stacklevel=3,
+        )
+
+
+def doubt_torque(newton_metres: float, most: float, what: str) -> None:
+    """Warn of a torque that is many times what a robot's weight makes at its reach, `most` [Nm]."""
+    if abs(newton_metres) > _STRONG * most:
+        warnings.warn(
+            f"{what} is {newton_metres:g} Nm, {abs(newton_metres) / most:.3g} times what the "
+            f"robot's weight makes at its reach. Torques are in Nm: {newton_metres:g} Nmm are "
+            f"{newton_metres / 1e3:g} Nm.",
             MagnitudeWarning,
             stacklevel=3,
         )

@@ -56,6 +56,12 @@ class Quantity:
         """The quantity, from its rows."""
         return float(self.sign * (self.sign * rows).min())
 
+    def most(self, weight: float) -> float:
+        """The most that is measured of it, under a robot of a weight [N]; in its unit."""
+        if self.sign < 0:
+            return math.inf
+        return _FAR * weight if self.unit == "N" else _FAR if self.unit == "m" else 1.0
+
     def shown(self, value: float, digits: int = 2) -> str:
         """A value with its unit, as people read it; of a length so many digits of its mm."""
         if math.isnan(value):

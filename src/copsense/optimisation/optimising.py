@@ -98,7 +98,7 @@ def optimise(
         stance, criterion, limits, over, within, reserve, distance, family, frame
     )
     wanted = quantity_named(objective)
-    required = required_of(require, wanted)
+    required = required_of(stance, require, wanted)
     starts = whole_number(starts, "the number of starts")
     seed = whole_number(seed, "the seed", least=0)
     iterations = whole_number(iterations, "the number of iterations")

@@ -80,7 +80,7 @@ def pareto_front(
             f"{', '.join(QUANTITIES)}."
         )
     first, second = (quantity_named(name) for name in objectives)
-    required = required_of(require, first, second)
+    required = required_of(stance, require, first, second)
 
     def ends(quantity: Quantity, bound: Mapping[str, float], begin: list[np.ndarray]) -> Solution:
         program = question.program(quantity, {**required, **bound})

@@ -11,6 +11,7 @@ from copsense.criterion import Criterion, check_criterion, minimum_torque
 from copsense.design import Family, family_named
 from copsense.errors import InvalidInputError
 from copsense.limits import Limits, check_limits
+from copsense.magnitudes import doubt_torque, in_metres
 from copsense.optimisation.objectives import Gauge, Quantity, quantity_named
 from copsense.optimisation.posture_program import PostureProgram
 from copsense.optimisation.variables import (
@@ -22,7 +23,7 @@ from copsense.optimisation.variables import (
     usual_coordinates,
     variables_of,
 )
-from copsense.reach import SWEPT, check_within_reach
+from copsense.reach import SWEPT, check_within_reach, robot_reach
 from copsense.stance import Stance, check_at_rest, check_stance
 from copsense.statics import with_tie_break
 
@@ -110,9 +111,16 @@ def asked(
     return question, notes
 
 
-def required_of(require: Mapping[str, float] | None, *objectives: Quantity) -> dict[str, float]:
-    """Check the bounds on quantities other than the objectives."""
-    found = {}
+def required_of(
+    stance: Stance, require: Mapping[str, float] | None, *objectives: Quantity
+) -> dict[str, float]:
+    """Check the bounds on quantities other than the objectives.
+
+    Raises:
+        UnknownNameError: no such quantity.
+        InvalidInputError: an objective, not a number, or more than there can be of the quantity.
+    """
+    robot, found = stance.robot, {}
     for name, value in (require or {}).items():
         quantity = quantity_named(name, "quantity")
         if quantity in objectives:
@@ -125,4 +133,25 @@ def required_of(require: Mapping[str, float] | None, *objectives: Quantity) -> d
                 f"the required {name} is {quantity.shown(found[name])} at most, and nothing has "
                 "less than zero of it. Give a positive number."
             )
+        _check_size(quantity, found[name], robot.weight)
+        if name == "torque":
+            doubt_torque(found[name], robot.weight * robot_reach(robot), f"the required {name}")
     return found
+
+
+def _check_size(quantity: Quantity, value: float, weight: float) -> None:
+    """Reject a bound that no posture of any robot keeps.
+
+    Raises:
+        InvalidInputError: it is more than is measured of the quantity; the message says the unit.
+    """
+    most = quantity.most(weight)
+    if value <= most:
+        return
+    why = {
+        "m": f"travels of the CoM are measured up to {most:g} m. {in_metres(value)}",
+        "N": f"pushes are measured up to the robot's weight, {most:.4g} N. Give less.",
+        "1": f"it is a share of a limit, 1 at most: {value:.4g} % are {value / 100:.4g}.",
+    }[quantity.unit]
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    raise InvalidInputError(f"the required {quantity.name} is {value:g}{unit}, and {why}")
