@@ -11,14 +11,15 @@ import pytest
 
 import copsense
 from copsense.batch import evaluate_batch
-from copsense.errors import InvalidInputError, MissingExtraError
+from copsense.batch.devices import compiling
+from copsense.errors import InvalidInputError, MissingExtraError, OutputError
 
 # Under Numba's simulator, which has to be chosen before Numba is imported.
 CODE = """
 import json, math
 import numpy as np, copsense
 from copsense.batch import BatchKernel
-from copsense.batch.statics import batch_kernel
+from copsense.batch.statics import batch_kernel, device_kernel
 from copsense.batch.statics.batch_result import arrays_of
 from support.stances import TORQUE, WRENCH, postures, served
 
@@ -46,10 +47,21 @@ def difference(name, criteria, limits, count, turns):
     assert here.reasons == there.reasons
     return {"gaps": gaps, "by_reference": [by_reference, asked[:]], "limits": limits}
 
+def without_compiler():
+    def absent(*_):
+        raise RuntimeError('Failure finding "libnvvm.so.4"')
+    device_kernel._clearing = {(1, 32): absent}
+    stance = copsense.load_stance("solo12")
+    try:
+        BatchKernel(stance, [TORQUE]).evaluate([stance.q], device="cuda")
+    except copsense.errors.InvalidInputError as error:
+        return str(error)
+
 print(json.dumps({
     "icub": difference("icub", served, None, 1, 0),
     "solo12": difference("solo12", lambda _: [WRENCH, TORQUE], None, 2, 20_000),
     "limited": difference("solo12", lambda _: [TORQUE], copsense.Limits(friction=0.1), 1, 0),
+    "without": without_compiler(),
 }))
 """
 
@@ -91,7 +103,8 @@ def simulated():
 
 
 def test_a_device_gives_what_the_processor_gives(simulated):
-    for name, found in simulated.items():
+    for name in ("icub", "solo12", "limited"):
+        found = simulated[name]
         for array, gap in found["gaps"].items():
             assert gap < 1e-12, (name, array)
 
@@ -106,6 +119,44 @@ def test_the_processor_puts_a_devices_answers_within_limits(simulated):
     here, there = simulated["limited"]["limits"]
     assert here == there
     assert any(here[0])
+
+
+def test_a_kernel_without_cudas_compiler_is_one_error(simulated):
+    assert simulated["without"].startswith('device is "cuda", and CUDA\'s compiler (NVVM) ')
+
+
+def errors_of_cuda():
+    """What Numba and NVIDIA's packages raise: where, and what copsense says of it."""
+    numba_errors = pytest.importorskip("numba.cuda.cudadrv.error")
+    driver = pytest.importorskip("numba.cuda.cudadrv.driver")
+    pathfinder = pytest.importorskip("cuda.pathfinder")
+    old = "Call to cuModuleLoadDataEx results in CUDA_ERROR_UNSUPPORTED_PTX_VERSION"
+    return [
+        (pathfinder.DynamicLibNotFoundError('Failure finding "libnvrtc.so.12"'), "(NVRTC) is mis"),
+        (numba_errors.NvvmSupportError("libNVVM is not available"), "(NVVM) is missing"),
+        (ModuleNotFoundError("No module named 'cuda.core'"), "compiler is missing (No module"),
+        (FileNotFoundError(2, "No such file", "libdevice.10.bc"), "(libdevice) is missing"),
+        (numba_errors.CCSupportError("capability 3.5 is not supported"), "does not serve this"),
+        (RuntimeError("less than the minimum supported by NVRTC 13.0"), "(NVRTC) does not serve"),
+        (driver.CudaAPIError(222, old), f"does not serve this device ([222] {old})."),
+        (numba_errors.NvvmError("x" * 999), "x ...)."),
+    ]
+
+
+def test_what_cudas_compilers_lack_is_one_error_with_the_line_that_installs_them():
+    for raised, said in errors_of_cuda():
+        with pytest.raises(InvalidInputError) as caught, compiling():
+            raise raised
+        assert caught.value.__cause__ is raised
+        assert said in str(caught.value)
+        assert 'pip install "copsense[gpu]"' in str(caught.value)
+        assert str(caught.value).endswith('give "cpu", to evaluate on the processor.')
+
+
+def test_an_error_that_is_not_of_cuda_is_left_alone():
+    for raised in (ZeroDivisionError("mine"), OutputError("of copsense")):
+        with pytest.raises(type(raised), match=str(raised)), compiling():
+            raise raised
 
 
 def test_a_device_that_is_not_there_is_one_error(monkeypatch):

@@ -13,6 +13,7 @@ from numba import cuda
 
 from copsense.batch.compiler import is_compiled, kept
 from copsense.batch.device import SIMULATED, device_name, for_device, itself
+from copsense.batch.devices import compiling
 from copsense.batch.statics import kernel
 from copsense.batch.statics.batch_result import BatchResult
 from copsense.batch.statics.compiled_kernel import out_arrays
@@ -102,7 +103,8 @@ class DeviceKernel:
         if new:
             _LOG.warning("compiling the statics of many postures for %s", device_name())
         began = time.monotonic()
-        _kernel[-(-count // _BLOCK), _BLOCK](*self._given, configurations, out, W, count)
+        with compiling():
+            _kernel[-(-count // _BLOCK), _BLOCK](*self._given, configurations, out, W, count)
         if new:
             _LOG.warning("compiled it in %.0f s", time.monotonic() - began)
 
@@ -116,7 +118,8 @@ class DeviceKernel:
             _sent(out_arrays(result, doubtful)),
             cuda.device_array((self._rows, postures)),
         )
-        _clearing[postures // _BLOCK, _BLOCK](self._memory[2])
+        with compiling():
+            _clearing[postures // _BLOCK, _BLOCK](self._memory[2])
 
 
 def _sent(parts: Any) -> Any:
