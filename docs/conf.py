@@ -6,6 +6,8 @@ import contextlib
 import html
 import logging as standard_logging
 import re
+import sys
+import time
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
@@ -255,8 +257,35 @@ def write_scenes(app: Sphinx, error: Exception | None) -> None:
         exec(compile(code, "scenes.md", "exec"), {"__name__": "scenes"})
 
 
+# Stages of a build, seconds to minutes each: the event that begins one and ends the one before.
+STAGES = (
+    ("builder-inited", 0, "running the examples"),
+    ("env-before-read-docs", 0, "reading the pages, running the notebooks"),
+    ("write-started", 0, "writing the pages"),
+    ("build-finished", 0, "making the scenes in 3-D"),
+    ("build-finished", 1000, ""),
+)
+
+
+def show_stages(app: Sphinx) -> None:
+    """Print a line for each stage of a build: what it does, then the seconds that it took."""
+    began: list[float] = []
+
+    def begin(name: str) -> None:
+        if began:
+            sys.stdout.write(f"  {time.monotonic() - began.pop():.0f} s\n")
+        if name:
+            sys.stdout.write(f"{name} ...\n")
+            began.append(time.monotonic())
+        sys.stdout.flush()
+
+    for event, priority, name in STAGES:
+        app.connect(event, lambda *_, name=name: begin(name), priority=priority)
+
+
 def setup(app: Sphinx) -> None:
     """Register the MathML renderer and what prepares docstrings, and make pages in 3-D."""
+    show_stages(app)
     app.connect("build-finished", write_scenes)
     app.connect("source-read", write_tables)
     app.connect("html-page-context", fit_in_width)

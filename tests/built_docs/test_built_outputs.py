@@ -2,6 +2,12 @@
 
 import re
 
+from support.browser import chromium, offline
+
+CODE = """() => [...document.querySelectorAll('div.highlight pre')]
+  .filter(code => code.scrollWidth > code.clientWidth)
+  .map(code => getComputedStyle(code).backgroundAttachment)"""
+
 
 def test_long_sentences_of_outputs_wrap_and_their_columns_do_not(built):
     page = (built / "tutorials" / "which_controller.html").read_text("utf-8")
@@ -19,3 +25,14 @@ def test_names_in_tables_break_after_dots_and_are_whole_in_the_text(built):
     page = (built / "api.html").read_text("utf-8")
     assert "copsense.<wbr>load_<wbr>stance" in page
     assert "<wbr>" not in re.sub(r"<td\b.*?</td>", "", page, flags=re.DOTALL)
+
+
+def test_code_that_goes_on_beside_a_narrow_screen_has_a_shadow_there(built):
+    with chromium() as browser:
+        with offline(browser, built / "coming_from.html", width=390) as page:
+            narrow = page.evaluate(CODE)
+        with offline(browser, built / "coming_from.html", width=1300) as page:
+            wide = page.evaluate(CODE)
+    assert narrow
+    assert set(narrow) == {"local, scroll"}  # what covers the shadow at the end, and the shadow
+    assert wide == []
