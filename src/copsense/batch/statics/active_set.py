@@ -343,6 +343,29 @@ def optimum(p: Programs, n: int, q: int) -> None:
 
 
 @compiled
+def _is_least(p: Programs, n: int, q: int) -> bool:
+    """Whether the q held rows alone prove the last coordinate least: e_t + A_h' u = 0 with u >= 0.
+
+    If so u is left in `u`. A first step often ends there, and needs no other to say so.
+    """
+    left = 0.0
+    for j in range(q, n):
+        left += p.Q[n - 1, j] * p.Q[n - 1, j]
+    if left > _PROVEN * _PROVEN:
+        return False
+    for k in range(q - 1, -1, -1):
+        s = -p.Q[n - 1, k]
+        for j in range(k + 1, q):
+            s -= p.R[k, j] * p.rate[j]
+        p.rate[k] = s / p.R[k, k]
+        if p.rate[k] < -_PROVEN:
+            return False
+    for k in range(q):
+        p.u[k] = max(p.rate[k], 0.0)
+    return True
+
+
+@compiled
 def relax(limits: KernelLimits, p: Programs, n: int, weight: float) -> int:
     """The least t by which every row must be relaxed, x[n - 1]; how many rows demand it.
 
@@ -359,6 +382,8 @@ def relax(limits: KernelLimits, p: Programs, n: int, weight: float) -> int:
         q = nearest(limits, p, n, True, _RELAXED * weight)
         if q < 0:
             return FAILED
+        if _is_least(p, n, q):
+            return q
         # The linear program's own condition, e_t + A' u / far = 0: no step is left.
         moved = abs(p.x[n - 1] - p.centre[n - 1] - far)
         for j in range(n - 1):

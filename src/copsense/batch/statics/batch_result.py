@@ -186,5 +186,13 @@ def clear_unanswered(
         if name != "com" and len(array):
             array[without] = nothing(name)
     limits.margins[without & (state == IMPOSSIBLE)] = np.nan
-    rows = [(int(i), int(j)) for i, j in np.argwhere(without)]
-    return {(i, j): limits.reason(i, j, contacts) for i, j in rows}
+    reasons: dict[tuple[int, int], str] = {}
+    said: dict[int, str] = {}  # of a posture without any wrench, whatever the criterion
+    for i, j in np.argwhere(without).tolist():
+        if state[i, j] == IMPOSSIBLE:
+            if i not in said:
+                said[i] = limits.reason(i, j, contacts)
+            reasons[i, j] = said[i]
+        else:
+            reasons[i, j] = limits.reason(i, j, contacts)
+    return reasons
