@@ -186,6 +186,8 @@ def clear_unanswered(
         if name != "com" and len(array):
             array[without] = nothing(name)
     limits.margins[without & (state == IMPOSSIBLE)] = np.nan
+    if len(limits.change_travel):  # at a cone's apex multipliers are not the only ones
+        limits.change_travel[without], limits.change_limit[without] = np.nan, -1
     reasons: dict[tuple[int, int], str] = {}
     said: dict[int, str] = {}  # of a posture without any wrench, whatever the criterion
     for i, j in np.argwhere(without).tolist():

@@ -58,7 +58,7 @@ def solve_limited(
     result.optimality[row, column] = found.optimality() if len(pressing) else 0.0
     result.margins[row, column] = _margins(table, found)
     result.state[row, column] = PRESSED if len(pressing) else WITHIN
-    if len(result.change_travel):
+    if len(result.change_travel) and not found.unloaded:
         _look_ahead(found, result, row, column)
     if found.unloaded:
         names = stance.contact_names
