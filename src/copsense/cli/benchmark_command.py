@@ -471,7 +471,9 @@ def _print(plan: Sequence[Case], table: pd.DataFrame) -> None:
             click.echo(f"  {str(score).replace('_', ' ')} [{unit}]")
             for row in group.itertuples():
                 click.echo(f"    {row.controller}: {_value(row, factor)}")
-    click.echo(f"\nranking over {len(plan)} cases (mean rank; shared within the resolution)")
+    tried = table.groupby(["robot", "posture", "conditions", "trial"])["controller"].agg(frozenset)
+    among = ", each among the controllers of its own setting" if tried.nunique() > 1 else ""
+    click.echo(f"\nranking over {len(plan)} cases (mean rank{among}; shared within the resolution)")
     for (trial, score), rows in rank_controllers(table).groupby(["trial", "score"], sort=False):
         alike = rows["settings"].nunique() == 1
         order = ", ".join(_ranked(row, alike) for row in rows.itertuples())
