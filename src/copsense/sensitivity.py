@@ -163,8 +163,9 @@ class CopSensitivity:
         """The limit that begins or ceases to press first, whichever way the CoM moves.
 
         Along the motions `com_motions`, in the horizontal direction that comes to a change first,
-        to first order: within its `travel` [m] the gains hold. What is only touched here is met at
-        once, travel 0.
+        to first order: within its `travel` [m] no limit changes the gains abruptly. What is only
+        touched here, and what presses leaves free to move, is met at once, travel 0. More in
+        `ConstrainedEquilibrium.nearest_active_set_change`.
 
         Returns:
             That change; None where nothing changes, as without limits.

@@ -103,7 +103,8 @@ def with_changes(dataset: xr.Dataset, rows: SweepRows) -> xr.Dataset:
             {
                 "units": "m",
                 "long_name": "first-order distance the centre of mass may move, whichever way, "
-                "before a limit begins or ceases to press; infinite where none will",
+                "before a limit begins or ceases to press; infinite where none will, NaN where a "
+                "tie-break alone presses",
             },
         ),
         "change_limit": (

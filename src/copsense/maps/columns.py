@@ -125,7 +125,7 @@ _WITHIN = {
     ),
     CHANGE_LIMIT: Column(
         _EACH,
-        "int16",
+        "int32",
         "",
         "index along limit_name of the limit that does; -1 for none",
     ),
@@ -213,4 +213,6 @@ FLAGS = {"status": STATUS, STATE_WITHIN: LIMIT_STATES}
 
 def fill_value(column: Column) -> Any:
     """What an array holds where it is not written."""
-    return {"str": "", "uint8": PENDING, "int16": -1, "int64": -1}.get(column.dtype, np.nan)
+    if column.dtype.startswith("int"):
+        return -1
+    return {"str": "", "uint8": PENDING}.get(column.dtype, np.nan)

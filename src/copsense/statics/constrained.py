@@ -20,10 +20,11 @@ own: same cost, the pressing rows held, and the weak ones not to be crossed.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from copsense.arrays import array_property, owned
 from copsense.changes import StanceChange
@@ -240,6 +241,7 @@ class ConstrainedEquilibrium(StaticEquilibrium):
         left = np.where(touching, self.row_multipliers, self.slack)
         closing = -np.where(touching, rates.multipliers, rates.slack)
         nearer = (closing > _CLOSING * np.abs(left)) & (strong | ~touching)
+        nearer &= ~self._problem.both_ways
         if not np.any(nearer):
             return None
         travel = np.where(nearer, left / np.where(nearer, closing, 1.0), np.inf)
@@ -254,8 +256,11 @@ class ConstrainedEquilibrium(StaticEquilibrium):
 
         Of all motions ``motions @ c`` with c of length 1, the one that comes to a change first: a
         limit off its bound is its slack away over the length of the slack's rates, a pressing one
-        its multiplier over the length of the multiplier's. What is only touched here is met at
-        once. None if nothing moves.
+        its multiplier over the length of the multiplier's. What is only touched here, and what
+        presses leaves free to move, is met at once. None if nothing moves.
+
+        Where more limits meet than can press independently, several choices of them press as well,
+        and the travel is that of the one at hand: another may leave the derivatives as they are.
 
         Args:
             motions: velocities V with J V = 0, as columns.
@@ -606,6 +611,15 @@ class _Problem:
         slack[multipliers != 0] = 0.0
         return Rates(df, joints - self.load.joint_map @ df, multipliers, slack)
 
+    @cached_property
+    def both_ways(self) -> Bool[np.ndarray, " r"]:
+        """Rows of torques that are held at nothing, whichever of the two presses."""
+        pairs = np.flatnonzero(self.joint >= 0).reshape(-1, 2)
+        slack = (self.b[pairs[:, 0]] + self.b[pairs[:, 1]]) / self.scale[pairs[:, 0]]
+        held = np.zeros(len(self.b), dtype=bool)
+        held[pairs[slack <= _TOUCHING * self.weight]] = True
+        return held
+
     def nearest_change(self, at: ConstrainedEquilibrium, motions: np.ndarray) -> tuple[int, float]:
         """The row that changes sides first along what these motions span, and its travel."""
         self.check_followed(np.flatnonzero(self.tied), at.row_multipliers)
@@ -618,7 +632,7 @@ class _Problem:
         left[strong] = at.row_multipliers[strong]
         unit[strong] = self.program.gradient_size(at.forces) / self.scale[strong]
         speed = np.linalg.norm(rates, axis=1)
-        moves = (speed > _STILL * unit) & ~self.tied
+        moves = (speed > _STILL * unit) & ~self.tied & ~self.both_ways
         if not np.any(moves):
             return -1, np.inf
         travel = np.where(moves, left / np.where(moves, speed, 1.0), np.inf)

@@ -268,6 +268,40 @@ def test_a_hand_that_would_have_to_pull_is_left_without_load(icub):
     assert UNLOADED in states
 
 
+def test_loads_that_the_balance_alone_fixes_are_within_limits_or_not(case):
+    # Three points on level ground: their rows answer to no choice, and rounding must not be one.
+    flat = copsense.load_stance("solo12")
+    stance, rng = flat.with_contacts(flat.contacts[1:]), np.random.default_rng(8)
+    chart = PostureChart(stance, ["com_x", "com_y"])
+    q = chart.solve(chart.values + rng.uniform(-0.03, 0.03, (30, 2))).configurations
+    loads = BatchKernel(stance, served(stance)[:1]).evaluate(q).wrenches[:, 0, :, 2]
+    limits = Limits(friction=None, normal_force=float(np.median(loads.min(axis=-1))))
+    found = BatchKernel(stance, served(stance), limits).evaluate(q)
+    for (i, j), criterion in zip(np.ndindex(len(q), 4), served(stance) * len(q), strict=True):
+        expected, error = reference_answer(stance.at(q[i]), criterion, limits)
+        assert (found.limits.state[i, j] == INFEASIBLE) == (expected is None)
+        if expected is None:
+            assert found.limits.relaxation[i] == pytest.approx(error.violation, rel=1e-6)
+    assert set(found.limits.state.ravel()) == {WITHIN, INFEASIBLE}
+
+
+def test_a_torque_held_at_nothing_does_not_let_go(icub):
+    # Whichever of its two rows presses, the joint bears no torque, and nothing changes.
+    stance = off_centre(icub)
+    q = postures(stance, 20, seed=3)
+    criteria, limits = [copsense.minimum_torque()], Limits(torque={"l_knee": 0.0})
+    found = BatchKernel(stance, criteria, limits).evaluate(q).limits
+    for i in np.flatnonzero(found.state[:, 0] == PRESSED).tolist():
+        change = found.nearest_change(i, 0)
+        assert change.kind != "torque"
+        expected = copsense.cop_sensitivity(stance.at(q[i]), criteria[0], limits)
+        assert change.travel == pytest.approx(expected.nearest_active_set_change().travel)
+        for way in (-1, 1):
+            along = expected.next_active_set_change(way * expected.com_motions[:, 1])
+            assert along is None or along.kind != "torque"
+    assert np.sum(found.state == PRESSED) > 10
+
+
 def test_without_numba_the_reference_answers_within_limits_too(answers, monkeypatch):
     stance, q, limits, found = answers("icub")
     find = importlib.util.find_spec

@@ -27,6 +27,7 @@ from copsense.batch.workspace import WIDTH
 
 INFEASIBLE, FAILED = -1, -2
 _DEPENDENT = 1e-18  # share (squared) that the held rows must leave of another, as in `Program`
+_FIXED = 1e-24  # share (squared) of what a row of its norm may answer to x, that is rounding
 _EASES = 1e-10  # rates, relative, under which a multiplier does not ease
 _MOST = 200  # changes of the held rows; a few are usual
 EXACT = 1e-12  # weights: by which a row may be broken
@@ -143,7 +144,10 @@ def nearest(limits: KernelLimits, p: Programs, n: int, soft: bool, tolerance: fl
         p.x[i] = p.centre[i]
         for j in range(n):
             p.Q[i, j] = 1.0 if i == j else 0.0
-    q = 0
+    q, reach = 0, 0.0
+    for i in range(len(p.now)):
+        for j in range(n):
+            reach += p.N[i, j] * p.N[i, j]
     for change in range(_MOST):
         new = measure(limits, p, n, soft)
         if change == 0:
@@ -159,9 +163,11 @@ def nearest(limits: KernelLimits, p: Programs, n: int, soft: bool, tolerance: fl
         missing, pressure, length = -p.slack[new], 0.0, 0.0
         for j in range(n):
             length += p.a[j] * p.a[j]
+        # What the balance alone fixes, such as the loads of three points, answers to no x.
+        nothing = max(_DEPENDENT * length, _FIXED * reach / (p.inverse[new] * p.inverse[new]))
         for _ in range(_MOST):
             left, first, step = _rates(p, n, q)
-            free = left > _DEPENDENT * length
+            free = left > nothing
             full = missing / left if free else np.inf
             if first < 0 and not free:
                 return INFEASIBLE

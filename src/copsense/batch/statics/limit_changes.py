@@ -30,7 +30,7 @@ from copsense.batch.layout import Feet, Tree
 from copsense.batch.statics.criteria import KernelCriteria
 from copsense.batch.statics.gradients import joint_multipliers
 from copsense.batch.statics.limit_offsets import LimitOffsets
-from copsense.batch.statics.limited_statics import Within, read_forces, read_maps
+from copsense.batch.statics.limited_statics import TOUCHING, Within, read_forces, read_maps
 from copsense.batch.statics.load_sharing import own_wrenches, weigh
 from copsense.batch.statics.loops import expand, gather_groups
 from copsense.batch.vectors import add3, along, cross3, dot3, load3, scale3, store3
@@ -195,11 +195,16 @@ def nearest_change(
         if p.torque[t] < 0.0:
             near, far = far, near
         p.travel[far] = np.inf
-        moves = speed * p.inverse[near] ** 2 > still * still
+        # Held at nothing either way, it is so whichever of its rows presses.
+        fixed = 2.0 * p.limit[t] * p.inverse[near] <= TOUCHING * feet.weight
+        moves = speed * p.inverse[near] ** 2 > still * still and not fixed
         p.travel[near] = slack * slack / speed if moves else np.inf
     for k in range(q):
         speed = p.u_rate[0, k] ** 2 + p.u_rate[1, k] ** 2
         moves = speed > (_STILL * size * p.inverse[held[k]]) ** 2
+        if held[k] >= rc:
+            limit = p.limit[(held[k] - rc) // 2]
+            moves = moves and 2.0 * limit * p.inverse[held[k]] > TOUCHING * feet.weight
         p.travel[held[k]] = u[k] * u[k] / speed if moves else np.inf
         again = held[k] + 1
         while again < rc and rows.public[again] < 0:

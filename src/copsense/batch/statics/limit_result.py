@@ -33,8 +33,8 @@ class LimitResult:
             of pressure; 4 where there is no answer for another reason. See `states`.
         pressing: index of the rows that press, -1 where there are fewer.
         multipliers: how hard they do, 0 where there are fewer; as `ActiveLimit.multiplier`.
-        touching: number of rows on their bounds that do not press: the sensitivities to the two
-            sides differ.
+        touching: number of rows on their bounds that do not press. Where what presses leaves one
+            of them free to move, the sensitivities to the two sides differ.
         optimality: largest violation of an optimality condition, recomputed from the results,
             as `ConstrainedEquilibrium.optimality`; 0 where nothing presses.
         margins: smallest distance to the limits of each contact or joint and kind, in its own unit.
@@ -44,8 +44,8 @@ class LimitResult:
         conflict: index of the rows that demand it, -1 where there are fewer.
         unloaded: a bit for each contact without load where one has none.
         change_travel: how far the CoM may travel to first order, whichever way, before a limit
-            begins or ceases to press [m]; infinite where none will, NaN where there is no answer;
-            empty where gains were not asked for.
+            begins or ceases to press [m]; infinite where none will, NaN where there is no answer or
+            a tie-break alone presses; empty where gains were not asked for.
         change_limit: index of the row that does; -1 for none. See `nearest_change`.
     """
 

@@ -63,6 +63,7 @@ _offsets, _limit_offsets = from_array(Offsets), from_array(LimitOffsets)
 
 _NO_LOAD = 0.5e-9  # share of the weight that is none, well under what the reference calls none
 _PROVEN = 1e-8  # violation of an optimality condition above which the reference answers
+_HUGE = 1e6  # weights: wrenches that no robot is meant to bear, likewise
 _DEMANDS = 1e-9  # multiplier of a row that demands that all be relaxed, as in `Program`
 
 
@@ -344,6 +345,9 @@ def _conclude(at: Within, lane: int, row: int, index: int, pack: Pack, found: Li
     column, q = criteria.column[index], pack.pressed[lane]
     error = violation(at, lane, index, pack.held[lane], pack.u[lane], q)
     found.optimality[row, column] = error
+    for c in range(len(p.now)):
+        if not abs(p.now[c]) < _HUGE * feet.weight:
+            return False
     if get(W, offset.doubt, lane) != 0.0:
         if get(W, limits.lost, lane) != 0.0:
             return False
