@@ -204,7 +204,7 @@ def limit_postures(
     return doubt
 
 
-@compiled
+@inlined
 def _settle(at: Within, lane: int, row: int, index: int, pack: Pack, found: LimitOut) -> None:
     """The active set of one posture, into its lane; `pack.pressed` is -2 if it was not found."""
     feet, offset, limits, rows, criteria, W, p = at
