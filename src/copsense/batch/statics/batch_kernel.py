@@ -30,7 +30,7 @@ from copsense.batch.statics.batch_result import (
     empty_result,
     set_reasons,
 )
-from copsense.batch.statics.compiled_kernel import CompiledKernel
+from copsense.batch.statics.compiled_kernel import NO_MOTIONS, CompiledKernel
 from copsense.batch.statics.compiled_limits import CompiledLimits
 from copsense.batch.statics.criteria import kernel_criteria
 from copsense.batch.statics.kernel_limits import kernel_limits
@@ -302,10 +302,13 @@ class BatchKernel(HoldsMachineCode):
 
         It has the kernel fill these rows, and returns whether any of them is doubtful.
         """
-        fill = partial(self._kernel.filling(q, result, doubtful), self._kernel.workspace())
+        motions = NO_MOTIONS
+        if self.limits is not None and self.gains:
+            motions = np.zeros((block, 2 * int(self.stance.robot.model.nv)))
+        fill = partial(self._kernel.filling(q, result, doubtful, motions), self._kernel.workspace())
         if self.limits is None:
             return fill
-        limit = self._limiting(q, result, doubtful, block)
+        limit = self._limiting(q, result, doubtful, block, motions)
 
         def both(start: int, stop: int) -> bool:
             fill(start, stop)
@@ -314,11 +317,16 @@ class BatchKernel(HoldsMachineCode):
         return both
 
     def _limiting(
-        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, block: int
+        self,
+        q: np.ndarray,
+        result: BatchResult,
+        doubtful: np.ndarray,
+        block: int,
+        motions: np.ndarray = NO_MOTIONS,
     ) -> Callable[[int, int], bool]:
         """The same for rows that the kernel without limits has filled."""
         memory = self._within.workspace(block)
-        return partial(self._within.filling(q, result, doubtful), *memory)
+        return partial(self._within.filling(q, result, doubtful, motions), *memory)
 
     def _answered(self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray) -> BatchResult:
         """The result, its doubtful rows filled by the reference."""

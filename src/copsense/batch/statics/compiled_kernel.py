@@ -41,7 +41,7 @@ class CompiledKernel(HoldsMachineCode):
         return workspace(self._offset.size)
 
     def filling(
-        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray
+        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, motions: np.ndarray
     ) -> Callable[[np.ndarray, int, int], bool]:
         """A function of a workspace, a first row and an end, that fills these rows.
 
@@ -51,11 +51,12 @@ class CompiledKernel(HoldsMachineCode):
             q: configurations (N, nq), contiguous.
             result: of N rows.
             doubtful: set above zero where the reference must answer (N, nk).
+            motions: to be filled for the limits, as of `kernel.Out`; `NO_MOTIONS` without limits.
         """
         from copsense.batch.compiler import bound
         from copsense.batch.statics.kernel import evaluate_postures
 
-        arguments = (*self._given, q, out_arrays(result, doubtful))
+        arguments = (*self._given, q, out_arrays(result, doubtful, motions))
         if self._code is None:
             given = (*arguments, self.workspace(), 0, 0)
             self._code = bound(evaluate_postures, given, "the statics of many postures")
@@ -69,12 +70,15 @@ class CompiledKernel(HoldsMachineCode):
         return self._device
 
 
-def out_arrays(result: BatchResult, doubtful: np.ndarray) -> Any:
+NO_MOTIONS = np.zeros((0, 0))
+
+
+def out_arrays(result: BatchResult, doubtful: np.ndarray, motions: np.ndarray = NO_MOTIONS) -> Any:
     """A result's arrays as `kernel.Out`, the form in which kernels fill them."""
     from copsense.batch.statics.kernel import Out
 
     arrays: dict[str, Any] = {n: a if n == "com" else flat(a) for n, a in arrays_of(result).items()}
-    return Out(**arrays, doubtful=doubtful)
+    return Out(**arrays, doubtful=doubtful, motions=motions)
 
 
 def flat(array: np.ndarray) -> np.ndarray:

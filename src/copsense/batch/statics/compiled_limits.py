@@ -54,6 +54,7 @@ class CompiledLimits(HoldsMachineCode):
             np.zeros(block, dtype=np.int64),
             np.zeros((block, self._criteria), dtype=np.uint8),
             np.zeros((WIDTH, self._nq)),
+            np.zeros((WIDTH, 2 * (len(self._layout.tree.parent) + 5))),
             np.zeros(WIDTH, dtype=np.int64),
             np.zeros((WIDTH, m), dtype=np.int64),
             np.zeros((WIDTH, m)),
@@ -65,7 +66,7 @@ class CompiledLimits(HoldsMachineCode):
         return workspace(self._offset.size), memory, pack
 
     def filling(
-        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray
+        self, q: np.ndarray, result: BatchResult, doubtful: np.ndarray, motions: np.ndarray
     ) -> Callable[..., bool]:
         """A function of a workspace (its three parts), a first row and an end.
 
@@ -76,6 +77,8 @@ class CompiledLimits(HoldsMachineCode):
             q: configurations (N, nq), contiguous.
             result: of N rows.
             doubtful: above zero where the reference must answer (N, nk).
+            motions: of each block, as the kernel without limits left them; `NO_MOTIONS` has them
+                computed once more.
         """
         from copsense.batch.compiler import bound
         from copsense.batch.statics.compiled_kernel import out_arrays
@@ -83,7 +86,7 @@ class CompiledLimits(HoldsMachineCode):
         from copsense.batch.statics.limited_kernel import limit_postures
 
         assert isinstance(result.limits, LimitResult)
-        out = out_arrays(result, doubtful)
+        out = out_arrays(result, doubtful, motions)
         arguments = (*self._given, q, out, LimitOut(**limit_arrays(result.limits)))
         if self._code is None:
             given = (*arguments, *self.workspace(1), 0, 0)

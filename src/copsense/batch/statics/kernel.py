@@ -30,7 +30,11 @@ _offsets = from_array(Offsets)
 
 
 class Out(NamedTuple):
-    """Arrays that a kernel fills, the posture first; named as in `BatchResult`."""
+    """Arrays that a kernel fills, the posture first; named as in `BatchResult`.
+
+    But `motions` are of a block of postures alone, the CoM motions that the limits need as well
+    (block, 2 nv); empty without limits.
+    """
 
     wrenches: np.ndarray
     torques: np.ndarray
@@ -44,6 +48,7 @@ class Out(NamedTuple):
     load_share: np.ndarray
     com: np.ndarray
     doubtful: np.ndarray
+    motions: np.ndarray
 
 
 @entry
@@ -80,6 +85,10 @@ def evaluate_postures(
         if gains:
             factorise_inertia(tree, offset, W)
             com_motions(tree, feet, offset, W)
+            if len(out.motions) > 0:
+                for lane in range(count):
+                    for i in range(2 * nv):
+                        out.motions[first + lane - start, i] = get(W, offset.motion + i, lane)
         for index in range(len(criteria.kind)):
             store(W, offset.doubt, load(W, offset.flag))
             if criteria.kind[index] == LEAST_WRENCH:

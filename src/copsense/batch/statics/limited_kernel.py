@@ -3,8 +3,8 @@
 It follows the kernel without limits and takes its results. Where no limit is near they stand;
 elsewhere postures are gathered, a few abreast, and solved within the limits, each from its own
 optimum without limits: a neighbour's active set would save it two or three changes of rows, and
-have it depend on who came before. Where gains are asked for, all postures go through their CoM
-motions once more, for the limits that come nearer along them.
+have it depend on who came before. Where gains are asked for, all postures go through once more, for
+the limits that come nearer as the CoM moves.
 """
 
 from __future__ import annotations
@@ -74,6 +74,7 @@ class Pack(NamedTuple):
         queue: postures that are to be solved (block,).
         candidate: whether a limit is near (block, nk).
         q: configurations of those abreast (`WIDTH`, nq).
+        motions: their CoM motions (`WIDTH`, 2 nv).
         pressed: rows that press, of each of them; -1 where nothing has to be done, -2 where the
             reference must (`WIDTH`,).
         held: these rows (`WIDTH`, m).
@@ -86,6 +87,7 @@ class Pack(NamedTuple):
     queue: np.ndarray
     candidate: np.ndarray
     q: np.ndarray
+    motions: np.ndarray
     pressed: np.ndarray
     held: np.ndarray
     u: np.ndarray
@@ -151,11 +153,16 @@ def limit_postures(
         build(feet, offset, W)
         set_load(tree, offset, W)
         write_scales(feet, offset, limits, W)
-        if moving:
-            span(feet, offset, W)
+        spanned = not moving
         if gains:
-            factorise_inertia(tree, offset, W)
-            com_motions(tree, feet, offset, W)
+            if len(out.motions) > 0:
+                for lane in range(count):
+                    for i in range(2 * nv):
+                        pack.motions[lane, i] = out.motions[pack.queue[first + lane] - start, i]
+                read_postures(W, offset.motion, pack.motions, 0, count)
+            else:
+                factorise_inertia(tree, offset, W)
+                com_motions(tree, feet, offset, W)
             move_joints(tree, feet, offset, limits, W)
         for index in range(len(criteria.kind)):
             store(W, offset.doubt, load(W, offset.flag))
@@ -177,6 +184,9 @@ def limit_postures(
                     doubt = doubt or pack.pressed[lane] < -1
                     doubt = doubt or found.state[row, criteria.column[index]] == IMPOSSIBLE
             if some:
+                if not spanned:
+                    span(feet, offset, W)
+                    spanned = True
                 move_unknowns(feet, offset, limits, W, criteria, index)
                 store(W, offset.doubt, load(W, limits.lost))
                 finish(tree, feet, offset, W)
