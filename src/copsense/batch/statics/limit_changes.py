@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from copsense.batch.compiler import compiled, inlined
+from copsense.batch.compiler import compiled
 from copsense.batch.lanes import get, least, load, splat, store, where_less
 from copsense.batch.layout import Feet, Tree
 from copsense.batch.statics.criteria import KernelCriteria
@@ -158,7 +158,7 @@ def _take_off_turning(
         store3(W, at + 3, add3(load3(W, at + 3), scale3(-1.0, along(W, axes, w))))
 
 
-@inlined
+@compiled
 def nearest_change(
     at: Within, lane: int, q: int, held: Any, u: Any, Q: Any, R: Any, size: float
 ) -> tuple[float, int]:
@@ -223,7 +223,7 @@ def nearest_change(
     return np.sqrt(travel), row
 
 
-@inlined
+@compiled
 def _read_rates(at: Within, lane: int) -> None:
     """One posture's rates of wrenches and torques along both motions, from its lane."""
     feet, _offset, limits, rows, _criteria, W, p = at
@@ -236,7 +236,7 @@ def _read_rates(at: Within, lane: int) -> None:
             p.torque_rate[e, t] = get(W, torque + feet.support[t], lane)
 
 
-@inlined
+@compiled
 def _hold_rates(at: Within, e: int, q: int, held: Any, Q: Any, R: Any) -> None:
     """What holding q rows makes of the rates along a motion, and those of their multipliers."""
     feet, _offset, _limits, rows, _criteria, _W, p = at
@@ -270,7 +270,7 @@ def _hold_rates(at: Within, e: int, q: int, held: Any, Q: Any, R: Any) -> None:
             p.torque_rate[e, t] -= p.B[t, j] * z
 
 
-@inlined
+@compiled
 def _contact_travels(at: Within) -> None:
     """CoM travel (squared) after which each of the contacts' rows is on its bound."""
     feet, _offset, _limits, rows, _criteria, _W, p = at
@@ -291,7 +291,7 @@ def _contact_travels(at: Within) -> None:
             store(p.travel, i, found)
 
 
-@inlined
+@compiled
 def _least(p: Any) -> tuple[float, int]:
     """The least travel (squared) of all rows, and the first that has it; -1 where none moves."""
     near, found = splat(np.inf), splat(-1.0)

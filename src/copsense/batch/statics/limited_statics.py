@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from copsense.batch.compiler import compiled, inlined
+from copsense.batch.compiler import compiled
 from copsense.batch.lanes import get, load, put, root, splat, store
 from copsense.batch.layout import Feet
 from copsense.batch.statics.active_set import Programs, measure, release, write_row
@@ -141,7 +141,7 @@ def read_program(at: Within, lane: int) -> None:
     read_maps(at, lane)
 
 
-@inlined
+@compiled
 def read_maps(at: Within, lane: int) -> None:
     """Of one posture's program N, B and the centre."""
     feet, _offset, limits, _rows, _criteria, W, p = at
@@ -158,7 +158,7 @@ def read_maps(at: Within, lane: int) -> None:
         p.B[t, r] = 0.0
 
 
-@inlined
+@compiled
 def read_forces(at: Within, lane: int) -> None:
     """Of one posture's program wrenches and torques, and the torques' limits."""
     feet, offset, limits, rows, _criteria, W, p = at
