@@ -60,6 +60,14 @@ def write_postures(W: Any, row: int, values: Any, first: int, count: int, column
         _write_square(W, row + i, values, start + i, stride)
 
 
+@compiled
+def write_rows(W: Any, row: int, values: Any, first: int, count: int) -> None:
+    """n rows of a workspace into values[first : first + count] (N, n)."""
+    for lane in range(count):
+        for i in range(values.shape[1]):
+            values[first + lane, i] = get(W, row + i, lane)
+
+
 @primitive
 def _read_square(typing: Any, W: Any, row: Any, array: Any, starts: Any) -> Any:
     """array.flat[start :][:WIDTH] of each posture into `WIDTH` rows."""

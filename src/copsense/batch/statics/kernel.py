@@ -22,7 +22,7 @@ from copsense.batch.statics.load_sharing import (
 )
 from copsense.batch.statics.loops import build
 from copsense.batch.statics.tangents import level_gradients, span
-from copsense.batch.transfer import read_postures, write_postures
+from copsense.batch.transfer import read_postures, write_postures, write_rows
 from copsense.batch.vectors import along, load3, store3
 from copsense.batch.workspace import WIDTH, Offsets
 
@@ -86,9 +86,7 @@ def evaluate_postures(
             factorise_inertia(tree, offset, W)
             com_motions(tree, feet, offset, W)
             if len(out.motions) > 0:
-                for lane in range(count):
-                    for i in range(2 * nv):
-                        out.motions[first + lane - start, i] = get(W, offset.motion + i, lane)
+                write_rows(W, offset.motion, out.motions, first - start, count)
         for index in range(len(criteria.kind)):
             store(W, offset.doubt, load(W, offset.flag))
             if criteria.kind[index] == LEAST_WRENCH:
